@@ -1,0 +1,1 @@
+"""Laws without a robot: rigid motions, B-spline curves, least squares."""

@@ -1,0 +1,72 @@
+"""Rigid motions of the plane, eq. (2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+Vector = NDArray[np.float64]
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """The same angle in (-pi, pi]."""
+    wrapped = math.remainder(angle_rad, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class SE2:
+    """Rigid motion `(x, y, theta)`: metres and radians, theta in (-pi, pi].
+
+    `pose_a_b @ points_b -> points_a`; `pose_a_b @ pose_b_c -> pose_a_c`. The paper's
+    `xi + delta` adds in these coordinates; it is not the exponential map.
+    """
+
+    x: float
+    y: float
+    theta: float
+
+    @classmethod
+    def identity(cls) -> SE2:
+        """The motion that changes nothing."""
+        return cls(0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_array(cls, xytheta: Iterable[float]) -> SE2:
+        """From three numbers x [m], y [m], theta [rad]; theta is wrapped."""
+        x, y, theta = (float(value) for value in xytheta)
+        return cls(x, y, wrap_angle(theta))
+
+    def as_array(self) -> Vector:
+        """(3,) float64: x, y, theta."""
+        return np.array([self.x, self.y, self.theta])
+
+    def inverse(self) -> SE2:
+        """The motion back."""
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        return SE2(
+            -cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap_angle(-self.theta)
+        )
+
+    def compose(self, other: SE2) -> SE2:
+        """`self` after `other`."""
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        return SE2(
+            self.x + cos * other.x - sin * other.y,
+            self.y + sin * other.x + cos * other.y,
+            wrap_angle(self.theta + other.theta),
+        )
+
+    def transform(self, points: Points) -> Points:
+        """Eq. (2): (m, 2) points of the inner frame, expressed in the outer one [m]."""
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        x, y = points[..., 0], points[..., 1]
+        return np.stack((cos * x - sin * y + self.x, sin * x + cos * y + self.y), axis=-1)
+
+    def __matmul__(self, other: SE2) -> SE2:
+        return self.compose(other)

@@ -1,0 +1,90 @@
+"""What every log reader offers, whatever the format behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.sensor.scan import Scan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """What the user asks of a log; see the shared flags of the command line.
+
+    start_s, end_s : seconds after the first scan.
+    odom : "auto", "none", "tf" or a topic.
+    """
+
+    topics: tuple[str, ...] = ()
+    odom: str = "auto"
+    pose_base_laser: SE2 | None = None
+    laser_flipped: bool = False
+    base_frame: str | None = None
+    start_s: float | None = None
+    end_s: float | None = None
+    every: int = 1
+    max_scans: int | None = None
+    angle_min_rad: float | None = None
+    angle_increment_rad: float | None = None
+    last_echo: bool = False
+    z_min_m: float | None = None
+    z_max_m: float | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class ReadReport:
+    """What happened while reading: filled as the scans are drawn.
+
+    warnings : one line each, for the user, without repetition.
+    """
+
+    scans_read: int = 0
+    scans_skipped: int = 0
+    truncated: bool = False
+    odometry: str = "none"
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicInfo:
+    """One stream of messages in a log."""
+
+    topic: str
+    type: str
+    messages: int
+    rate_hz: float
+    frame: str
+    usable: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogInfo:
+    """What a log holds and what `slam` would take from it."""
+
+    format: str
+    duration_s: float
+    topics: tuple[TopicInfo, ...]
+    selected: tuple[str, ...]
+    beams: int
+    odometry: str
+
+
+class LogReader(Protocol):
+    """A context manager that streams the scans of one log, once, in the order of the log."""
+
+    report: ReadReport
+
+    def __enter__(self) -> LogReader: ...
+
+    def __exit__(self, *exc: object) -> None: ...
+
+    def scans(self) -> Iterator[Scan]:
+        """The scans, one at a time; a bad one is counted in `report` and skipped."""
+        ...
+
+    def info(self) -> LogInfo:
+        """What the log holds; reads it to the end where the format has no index."""
+        ...

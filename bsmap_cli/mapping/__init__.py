@@ -1,0 +1,1 @@
+"""Section III: curves from scans and a map from curves."""

@@ -1,0 +1,1 @@
+"""What was measured, in its own frame: scans, odometry, the simulator."""
