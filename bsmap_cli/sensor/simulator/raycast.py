@@ -1,0 +1,255 @@
+"""Exact ranges to segments and arcs: rays walk a uniform grid (Amanatides and Woo 1987)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.sensor.simulator.world import Shapes, Table
+
+CELL_M = 0.5
+MAX_CELLS = 4_000_000
+_MARGIN_M = 1e-6  # a surface is also entered in cells that it misses by less
+_ENDS = 1e-9  # of a segment's length: rays between two joined segments do not slip through
+
+
+Ray = tuple[float, float, float, float]  # x, y [m], unit vector ahead
+
+
+class Grid(NamedTuple):
+    """Shapes and which cells they cross.
+
+    segments, arcs : as in `Shapes`. origin : (2,) lower left corner [m].
+    columns, rows : size in cells; cell (column, row) has the number row * columns + column.
+    starts : (cells + 1,) int64, items : int32: items[starts[c]:starts[c + 1]] are the shapes in
+    cell c, segments first, arcs counted on from there.
+    """
+
+    segments: Table
+    arcs: Table
+    origin: Vector
+    cell_m: float
+    columns: int
+    rows: int
+    starts: NDArray[np.int64]
+    items: NDArray[np.int32]
+
+
+def grid_of(shapes: Shapes, cell_m: float = CELL_M) -> Grid:
+    """Sort shapes into cells; cells grow where the world is too large for them."""
+    low, high = _bounds(shapes)
+    size = np.maximum(high - low, _MARGIN_M)
+    cell_m = max(cell_m, math.sqrt(float(size[0] * size[1]) / MAX_CELLS), float(size.max()) / 1e5)
+    columns, rows = (int(count) for count in np.ceil(size / cell_m).astype(np.int64))
+    counts = np.zeros(columns * rows + 1, np.int64)
+    frame = (shapes.segments, shapes.arcs, low, cell_m, columns, rows)
+    _sort_into_cells(Grid(*frame, counts, np.zeros(0, np.int32)), counts, True)
+    starts = np.cumsum(counts)
+    items = np.zeros(int(starts[-1]), np.int32)
+    _sort_into_cells(Grid(*frame, starts, items), starts[:-1].copy(), False)
+    return Grid(*frame, starts, items)
+
+
+def single_cell(shapes: Shapes) -> Grid:
+    """A grid of one cell: for few shapes that move."""
+    low, high = _bounds(shapes)
+    cell_m = max(float((high - low).max()), _MARGIN_M)
+    starts = np.array([0, len(shapes)], np.int64)
+    items = np.arange(len(shapes), dtype=np.int32)
+    return Grid(shapes.segments, shapes.arcs, low, cell_m, 1, 1, starts, items)
+
+
+def _bounds(shapes: Shapes) -> tuple[Vector, Vector]:
+    """Corners of the box round all shapes, a little wider."""
+    centres, radii = shapes.arcs[:, :2], shapes.arcs[:, 2:3]
+    corners = (shapes.segments[:, :2], shapes.segments[:, 2:], centres - radii, centres + radii)
+    points = np.concatenate(corners)
+    if not len(points):
+        return np.zeros(2), np.zeros(2)
+    return points.min(axis=0) - 10 * _MARGIN_M, points.max(axis=0) + 10 * _MARGIN_M
+
+
+@njit(cache=True)
+def _segment_meets_box(segment: Vector, low_x: float, low_y: float, side: float) -> bool:
+    """Whether the segment's line passes the box; its extent is checked by the caller."""
+    half = side / 2.0
+    x, y = segment[0] - low_x - half, segment[1] - low_y - half
+    along_x, along_y = segment[2] - segment[0], segment[3] - segment[1]
+    distance = abs(along_x * y - along_y * x)
+    reach = half * (abs(along_x) + abs(along_y))
+    return bool(distance <= reach + _MARGIN_M * math.hypot(along_x, along_y))
+
+
+@njit(cache=True)
+def _circle_meets_box(arc: Vector, low_x: float, low_y: float, side: float) -> bool:
+    """Whether the whole circle of the arc passes the box."""
+    half = side / 2.0
+    x, y = abs(arc[0] - low_x - half), abs(arc[1] - low_y - half)
+    nearest = math.hypot(max(x - half, 0.0), max(y - half, 0.0))
+    farthest = math.hypot(x + half, y + half)
+    return bool(nearest <= arc[2] + _MARGIN_M and farthest >= arc[2] - _MARGIN_M)
+
+
+@njit(cache=True)
+def _sort_into_cells(grid: Grid, cursor: NDArray[np.int64], only_count: bool) -> None:
+    """Count the shapes of cell c in cursor[c + 1], or write them from cursor[c] on."""
+    segment_count = len(grid.segments)
+    for item in range(segment_count + len(grid.arcs)):
+        if item < segment_count:
+            x0, y0, x1, y1 = grid.segments[item]
+            low_x, high_x, low_y, high_y = min(x0, x1), max(x0, x1), min(y0, y1), max(y0, y1)
+        else:
+            x, y, radius = grid.arcs[item - segment_count, :3]
+            low_x, high_x, low_y, high_y = x - radius, x + radius, y - radius, y + radius
+        first_column = max(0, int((low_x - _MARGIN_M - grid.origin[0]) / grid.cell_m))
+        last_column = min(
+            grid.columns - 1, int((high_x + _MARGIN_M - grid.origin[0]) / grid.cell_m)
+        )
+        first_row = max(0, int((low_y - _MARGIN_M - grid.origin[1]) / grid.cell_m))
+        last_row = min(grid.rows - 1, int((high_y + _MARGIN_M - grid.origin[1]) / grid.cell_m))
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
+                left = grid.origin[0] + column * grid.cell_m
+                bottom = grid.origin[1] + row * grid.cell_m
+                if item < segment_count:
+                    meets = _segment_meets_box(grid.segments[item], left, bottom, grid.cell_m)
+                else:
+                    meets = _circle_meets_box(
+                        grid.arcs[item - segment_count], left, bottom, grid.cell_m
+                    )
+                if not meets:
+                    continue
+                cell = row * grid.columns + column
+                if only_count:
+                    cursor[cell + 1] += 1
+                else:
+                    grid.items[cursor[cell]] = item
+                    cursor[cell] += 1
+
+
+@njit(cache=True)
+def _to_segment(segment: Vector, ray: Ray) -> float:
+    """Distance along the ray to the segment, inf where it misses; parallel rays miss."""
+    x, y, ahead_x, ahead_y = ray
+    along_x, along_y = segment[2] - segment[0], segment[3] - segment[1]
+    off_x, off_y = segment[0] - x, segment[1] - y
+    cross = ahead_x * along_y - ahead_y * along_x
+    if cross * cross <= 1e-24 * (along_x * along_x + along_y * along_y):
+        return math.inf
+    distance = (off_x * along_y - off_y * along_x) / cross
+    share = (off_x * ahead_y - off_y * ahead_x) / cross
+    if distance <= 0.0 or share < -_ENDS or share > 1.0 + _ENDS:
+        return math.inf
+    return float(distance)
+
+
+@njit(cache=True)
+def _to_arc(arc: Vector, ray: Ray) -> float:
+    """Distance along the ray to the nearest point on the arc, inf where it misses."""
+    x, y, ahead_x, ahead_y = ray
+    off_x, off_y = arc[0] - x, arc[1] - y
+    middle = ahead_x * off_x + ahead_y * off_y
+    aside = ahead_x * off_y - ahead_y * off_x
+    square = arc[2] * arc[2] - aside * aside
+    if square < 0.0:
+        return math.inf
+    half_chord = math.sqrt(square)
+    for distance in (middle - half_chord, middle + half_chord):
+        if distance <= 0.0:
+            continue
+        angle = math.atan2(distance * ahead_y - off_y, distance * ahead_x - off_x) - arc[3]
+        angle -= math.floor(angle / math.tau) * math.tau
+        if angle <= arc[4] + _ENDS or angle >= math.tau - _ENDS:
+            return float(distance)
+    return math.inf
+
+
+@njit(cache=True)
+def _entry(grid: Grid, ray: Ray) -> tuple[float, float]:
+    """Distances at which the ray enters and leaves the grid; the first is larger: it misses."""
+    x, y, ahead_x, ahead_y = ray
+    enter, leave = 0.0, math.inf
+    for start, ahead, low, cells in (
+        (x, ahead_x, grid.origin[0], grid.columns),
+        (y, ahead_y, grid.origin[1], grid.rows),
+    ):
+        high = low + cells * grid.cell_m
+        if ahead == 0.0:
+            if start < low or start > high:
+                return 1.0, 0.0
+            continue
+        near, far = (low - start) / ahead, (high - start) / ahead
+        enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+    return enter, leave
+
+
+@njit(cache=True)
+def _first_hit(grid: Grid, ray: Ray, reach: float) -> float:
+    """Distance to the first surface up to `reach`, else inf: cell after cell along the ray."""
+    x, y, ahead_x, ahead_y = ray
+    enter, leave = _entry(grid, ray)
+    if enter > min(leave, reach):
+        return math.inf
+    side = grid.cell_m
+    column = int((x + enter * ahead_x - grid.origin[0]) / side)
+    row = int((y + enter * ahead_y - grid.origin[1]) / side)
+    column, row = min(max(column, 0), grid.columns - 1), min(max(row, 0), grid.rows - 1)
+    step_x, step_y = (1 if ahead_x > 0.0 else -1), (1 if ahead_y > 0.0 else -1)
+    per_column = side / abs(ahead_x) if ahead_x != 0.0 else math.inf
+    per_row = side / abs(ahead_y) if ahead_y != 0.0 else math.inf
+    next_x = grid.origin[0] + (column + (step_x > 0)) * side
+    next_y = grid.origin[1] + (row + (step_y > 0)) * side
+    leave_x = (next_x - x) / ahead_x if ahead_x != 0.0 else math.inf
+    leave_y = (next_y - y) / ahead_y if ahead_y != 0.0 else math.inf
+    nearest = math.inf
+    segment_count = len(grid.segments)
+    while True:
+        cell = row * grid.columns + column
+        for index in range(grid.starts[cell], grid.starts[cell + 1]):
+            item = grid.items[index]
+            if item < segment_count:
+                distance = _to_segment(grid.segments[item], ray)
+            else:
+                distance = _to_arc(grid.arcs[item - segment_count], ray)
+            nearest = min(nearest, distance)
+        crossing = min(leave_x, leave_y)
+        if nearest <= crossing or crossing > reach:
+            break
+        if leave_x < leave_y:
+            column += step_x
+            leave_x += per_column
+        else:
+            row += step_y
+            leave_y += per_row
+        if column < 0 or column >= grid.columns or row < 0 or row >= grid.rows:
+            break
+    return nearest if nearest <= reach else math.inf
+
+
+@njit(cache=True)
+def cast_rays(
+    grid: Grid, poses: NDArray[np.float64], angles: Vector, reach_m: float, ranges: Vector
+) -> None:
+    """Lower `ranges` [m] to the first surface that each ray meets within `reach_m`.
+
+    poses : (1, 3) one for all rays, or (n, 3) one a ray: x, y [m], heading [rad], world frame.
+    angles : (n,) direction of each ray from its pose [rad]. ranges : (n,) in and out.
+    """
+    for index in range(len(angles)):
+        pose = poses[index if len(poses) > 1 else 0]
+        direction = pose[2] + angles[index]
+        ray = (pose[0], pose[1], math.cos(direction), math.sin(direction))
+        ranges[index] = min(ranges[index], _first_hit(grid, ray, reach_m))
+
+
+def ranges_to(shapes: Shapes, origin: Points, angles: Vector, reach_m: float = math.inf) -> Vector:
+    """(n,) range [m] from one point (2,) of the shapes' frame to them in each direction, or inf."""
+    ranges = np.full(len(angles), math.inf)
+    pose = np.array([[origin[0], origin[1], 0.0]])
+    cast_rays(grid_of(shapes), pose, np.asarray(angles, np.float64), reach_m, ranges)
+    return ranges

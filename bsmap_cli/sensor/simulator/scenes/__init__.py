@@ -1,0 +1,15 @@
+"""The scenes that `simulate` knows."""
+
+from bsmap_cli.sensor.simulator.scenes import corridors, rooms
+from bsmap_cli.sensor.simulator.scenes.scene import Scene, SceneEntry
+
+__all__ = ["SCENES", "Scene", "SceneEntry"]
+
+SCENES = {
+    "wall": SceneEntry("12 m along a wall with niches and pilasters", rooms.wall),
+    "spin": SceneEntry("360 degrees on the spot in a room", rooms.spin),
+    "shapes": SceneEntry("geometric shapes in a room of 10 m by 8 m", rooms.shapes),
+    "loop": SceneEntry("a ring of corridors, 30 m by 20 m, twice round", corridors.loop),
+    "corridor": SceneEntry("bare parallel walls without an end in sight", corridors.corridor),
+    "twins": SceneEntry("two identical rooms joined by a corridor", corridors.twins),
+}
