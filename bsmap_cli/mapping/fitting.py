@@ -1,17 +1,224 @@
-"""Fit a curve to a cluster: Sec. III-C, eqs. (6)-(8)."""
+"""Fit a curve to ordered points by least squares: Sec. III-C, eqs. (6)-(8)."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+
+from bsmap_cli.errors import FitError
+from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.curve import Curve
+from bsmap_cli.geometry.kernels import basis_weights, solve_banded
+from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.settings import setting
+
+RIDGE = 1e-8  # of the largest diagonal entry: keeps unobserved control points defined
+SNAP = 1e-9  # lattice units: a parameter this close to a knot lies on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FittingSettings:
     """How points become a curve."""
 
-    parameters: str = setting("arc", "curve parameter of a point: arc length of a smooth first fit, or the chord length of eq. (7)", choices=("arc", "chord"))
-    penalty: float = setting(1e-3, "on third differences of the control points, relative to the data of one span", minimum=0.0)
-    first_penalty: float = setting(2e-2, "the same, for the fit that gives the arc length", minimum=0.0)
-    thinning: float = setting(0.2, "points are averaged into bins of this length [knot steps]", minimum=0.0)
+    parameters: str = setting(
+        "arc",
+        "parameter of a point: arc length along a smooth first fit, or the chord length of eq. (7)",
+        choices=("arc", "chord"),
+    )
+    penalty: float = setting(
+        1e-3, "on third differences of control points, relative to one span's data", minimum=0.0
+    )
+    first_penalty: float = setting(
+        2e-2, "the same for the first fit, which gives the arc length", minimum=0.0
+    )
+    thinning: float = setting(
+        0.2, "points are averaged into bins of this length [knot steps]", minimum=0.0
+    )
+
+
+@njit(cache=True)
+def chord_length_parameters(points: Points, start_u: float, knot_step_m: float, u: Vector) -> None:
+    """Eq. (7) in lattice units: u_1 = `start_u`, u_j = u_(j-1) + |p_j - p_(j-1)| / Delta."""
+    u[0] = start_u
+    for j in range(1, len(u)):
+        chord = math.hypot(points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1])
+        u[j] = u[j - 1] + chord / knot_step_m
+
+
+@njit(cache=True)
+def lattice_domain(first_u: float, last_u: float) -> tuple[int, int]:
+    """First span and end of the knot vector t_i^k that carries [first_u, last_u]."""
+    low = math.floor(first_u + SNAP)
+    return low, max(math.ceil(last_u - SNAP), low + 1)
+
+
+@njit(cache=True)
+def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
+    """Share of one span that each point stands for: half the way to both neighbours, capped."""
+    n = len(u)
+    for j in range(n):
+        before = min(longest, abs(u[j] - u[j - 1])) if j > 0 else 0.0
+        after = min(longest, abs(u[j + 1] - u[j])) if j < n - 1 else 0.0
+        weights[j] = 0.5 * (before + after)
+
+
+@njit(cache=True)
+def fit_control_points(
+    u: Vector,
+    points: Points,
+    weights: Vector,
+    matrix: Points,
+    first_span: int,
+    penalty: float,
+    known: Points,
+    is_known: Vector,
+    solution: Points,
+) -> bool:
+    """Minimise eq. (6) plus `penalty` on third differences; control points from g = first_span - d.
+
+    The normal equations B^T W B of eq. (8) are banded: no pseudo-inverse is ever formed. Where
+    all control points of a third difference are `known`, it is held to the difference they have,
+    so that a correction is smoothed and not the shape of the map. False if the system is singular.
+    """
+    n = len(solution)
+    order = matrix.shape[0]
+    band = np.zeros((n, max(order, 4)))
+    basis = np.empty(order)
+    solution[:] = 0.0
+    for j in range(len(u)):
+        span = min(max(math.floor(u[j]) - first_span, 0), n - order)
+        basis_weights(matrix, u[j] - first_span - span, basis)
+        for a in range(order):
+            weighted = weights[j] * basis[a]
+            solution[span + a, 0] += weighted * points[j, 0]
+            solution[span + a, 1] += weighted * points[j, 1]
+            for b in range(a, order):
+                band[span + a, b - a] += weighted * basis[b]
+    largest = 1e-12
+    for i in range(n):
+        largest = max(largest, band[i, 0])
+    for i in range(n):
+        band[i, 0] += RIDGE * largest
+        if is_known[i] > 0.0:
+            solution[i, 0] += RIDGE * largest * known[i, 0]
+            solution[i, 1] += RIDGE * largest * known[i, 1]
+    stencil = (-1.0, 3.0, -3.0, 1.0)
+    for i in range(n - 3):
+        tx = ty = 0.0
+        if is_known[i] * is_known[i + 1] * is_known[i + 2] * is_known[i + 3] > 0.0:
+            for a in range(4):
+                tx += stencil[a] * known[i + a, 0]
+                ty += stencil[a] * known[i + a, 1]
+        for a in range(4):
+            solution[i + a, 0] += penalty * stencil[a] * tx
+            solution[i + a, 1] += penalty * stencil[a] * ty
+            for b in range(a, 4):
+                band[i + a, b - a] += penalty * stencil[a] * stencil[b]
+    return solve_banded(band, solution)
+
+
+@njit(cache=True)
+def arc_length_parameters(
+    u: Vector, control_points: Points, matrix: Points, first_span: int, anchor: int, step_m: float
+) -> None:
+    """Replace u by arc length / Delta along the fitted curve; u[anchor] stays as it is.
+
+    Raw chord length grows with the noise; a smooth fit through the noise does not.
+    """
+    order = matrix.shape[0]
+    basis = np.empty(order)
+    spans = len(control_points) - order + 1
+    kept = u[anchor]
+    samples = 8
+    x_before = y_before = 0.0
+    arc = 0.0
+    last = u[0]
+    for j in range(len(u)):
+        pieces = 1 if j == 0 else max(1, math.ceil((u[j] - last) * samples))
+        start = last
+        target = u[j]
+        for piece in range(1, pieces + 1):
+            v = start + (target - start) * piece / pieces
+            span = min(max(math.floor(v) - first_span, 0), spans - 1)
+            basis_weights(matrix, v - first_span - span, basis)
+            x = y = 0.0
+            for a in range(order):
+                x += basis[a] * control_points[span + a, 0]
+                y += basis[a] * control_points[span + a, 1]
+            if j > 0 or piece > 1:
+                arc += math.hypot(x - x_before, y - y_before) / step_m
+            x_before, y_before = x, y
+        last = target
+        u[j] = arc
+    shift = kept - u[anchor]
+    for j in range(len(u)):
+        u[j] += shift
+
+
+def fit_curve(
+    points: Points,
+    settings: FittingSettings,
+    *,
+    knot_step_m: float,
+    degree: int,
+    start_m: float = 0.0,
+) -> Curve:
+    """Fit one uniform non-clamped B-spline to one ordered cluster.
+
+    Parameters
+    ----------
+    points : (m, 2) float64, ordered cluster [m]; the curve comes back in the same frame.
+    start_m : tau_1 [m]: 0 for a new curve, the tracked offset otherwise.
+
+    Returns
+    -------
+    Curve with n - d - 1 control points minimising eq. (6), supported on [tau_1, tau_m], weights 1.
+
+    Raises
+    ------
+    FitError : fewer than d + 1 points.
+
+    Notes
+    -----
+    With `parameters="chord"`, penalty 0 and no arc length this is the paper's fit; a basis function
+    that meets the data only with the tip of its support then leaves its control point almost free.
+    """
+    if len(points) <= degree:
+        raise FitError(
+            f"{len(points)} points cannot carry a curve of degree {degree}: "
+            "raise segmentation.min_points or lower degree"
+        )
+    matrix = basis_matrix(degree)
+    u = np.empty(len(points))
+    chord_length_parameters(points, start_m / knot_step_m, knot_step_m, u)
+    penalties = [settings.penalty]
+    if settings.parameters == "arc":
+        penalties.insert(0, settings.first_penalty)
+    weights = np.empty(len(u))
+    for attempt, penalty in enumerate(penalties):
+        low, high = lattice_domain(u[0], u[-1])
+        count = high - low + degree
+        control_points, none = np.empty((count, 2)), np.zeros((count, 2))
+        if settings.parameters == "arc":
+            spacing_weights(u, 1.0, weights)
+        else:
+            weights[:] = (u[-1] - u[0]) / len(u)  # one span's worth of data weighs one
+        solved = fit_control_points(
+            u, points, weights, matrix, low, penalty, none, np.zeros(count), control_points
+        )
+        if not solved:
+            raise FitError("the points leave a control point undefined: raise fitting.penalty")
+        if attempt + 1 < len(penalties):
+            arc_length_parameters(u, control_points, matrix, low, 0, knot_step_m)
+    return Curve(
+        degree=degree,
+        knot_step_m=knot_step_m,
+        first_index=low - degree,
+        control_points=control_points,
+        weights=np.ones(count),
+        tau_start_m=u[0] * knot_step_m,
+        tau_end_m=u[-1] * knot_step_m,
+    )

@@ -1,15 +1,291 @@
-"""Extend and average map curves: Sec. III-D, eqs. (12)(13) and Table I."""
+"""Extend and average map curves: Sec. III-D, eqs. (12)(13) and Table I.
+
+Two curves on one lattice share their basis functions, so a weighted sum of curves is the same
+weighted sum of control points, exactly. Table I is that union written out. Here each control
+point of a scan also carries the share omega in [0, 1] of its basis function that data cover,
+and enters the average with it: one rule for interior and ends.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.kernels import basis_weights
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.curve_map import USABLE_WEIGHT, refresh_spans
+from bsmap_cli.mapping.fitting import (
+    arc_length_parameters,
+    chord_length_parameters,
+    fit_control_points,
+    lattice_domain,
+    spacing_weights,
+)
+from bsmap_cli.mapping.level_arrays import LevelArrays
+from bsmap_cli.mapping.runs import BEGIN, CURVE, END, KNOWN_BEGIN, KNOWN_END
+from bsmap_cli.mapping.span_index import remove_span
 from bsmap_cli.settings import setting
+
+LEAST_WEIGHT = 1e-3  # of a control point that only the tip of its basis function has seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MergingSettings:
     """How new curves enter the map."""
 
-    method: str = setting("fractional", "weigh control points by the data under their basis function, or Table I as printed", choices=("fractional", "table"))
-    max_weight: int = setting(50, "a control point counts at most so many observations", symbol="gamma_weight", minimum=1, maximum=255)
+    method: str = setting(
+        "fractional",
+        "weigh control points by the data under their basis function, or Table I as printed",
+        choices=("fractional", "table"),
+    )
+    max_weight: int = setting(
+        50,
+        "a control point counts at most so many observations",
+        symbol="gamma_weight",
+        minimum=1,
+        maximum=255,
+    )
+
+
+@njit(cache=True)
+def has_room(level: LevelArrays, rows: int) -> bool:
+    """Can a curve grow or start that needs `rows` rows?"""
+    return (
+        level.sizes[1] + rows <= len(level.weights)
+        and level.sizes[0] + 1 < len(level.first)
+        and 2 * (level.sizes[2] + rows) <= len(level.cell_keys)
+    )
+
+
+@njit(cache=True)
+def _claim_rows(level: LevelArrays, curve: int, first: int, count: int) -> int:
+    """Give a curve fresh rows with room at both ends; returns its new offset."""
+    slack = max(4, count // 2)
+    low = level.sizes[1]
+    level.low[curve] = low
+    level.high[curve] = low + count + 2 * slack
+    level.sizes[1] = level.high[curve]
+    level.first[curve] = first
+    level.count[curve] = count
+    level.offset[curve] = low + slack
+    for row in range(low, level.high[curve]):
+        level.owner[row] = curve
+        level.span_cell[row] = -1
+    return low + slack
+
+
+@njit(cache=True)
+def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
+    """Let a curve hold the lattice indices `first` .. `end` - 1 too; True if its rows moved.
+
+    New control points have weight 0.
+    """
+    old_first, old_count, old_offset = level.first[curve], level.count[curve], level.offset[curve]
+    new_first = min(first, old_first)
+    new_count = max(end, old_first + old_count) - new_first
+    offset = old_offset - (old_first - new_first)
+    moved = offset < level.low[curve] or offset + new_count > level.high[curve]
+    if moved:
+        for row in range(old_offset, old_offset + old_count):
+            remove_span(level, row)
+            level.owner[row] = -1
+        offset = _claim_rows(level, curve, new_first, new_count)
+        shift = offset + (old_first - new_first) - old_offset
+        for row in range(old_offset, old_offset + old_count):
+            level.points[row + shift] = level.points[row]
+            level.weights[row + shift] = level.weights[row]
+    level.first[curve] = new_first
+    level.count[curve] = new_count
+    level.offset[curve] = offset
+    for row in range(offset, offset + old_first - new_first):
+        level.weights[row] = 0.0
+    for row in range(offset + old_first - new_first + old_count, offset + new_count):
+        level.weights[row] = 0.0
+    return moved
+
+
+@njit(cache=True)
+def _start_curve(level: LevelArrays, first: int, count: int) -> int:
+    """A new curve without observations, eq. (12)."""
+    curve = level.sizes[0]
+    level.sizes[0] += 1
+    offset = _claim_rows(level, curve, first, count)
+    level.weights[offset : offset + count] = 0.0
+    level.support[curve, 0] = math.inf
+    level.support[curve, 1] = -math.inf
+    level.seen[curve] = 0
+    return curve
+
+
+@njit(cache=True)
+def _observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: Vector) -> None:
+    """omega_g = sum_j (ds_j / Delta) B_g(tau_j): 1 inside the data whatever their density."""
+    order = matrix.shape[0]
+    basis = np.empty(order)
+    omega[:] = 0.0
+    for j in range(len(u)):
+        span = min(max(math.floor(u[j]) - low, 0), len(omega) - order)
+        basis_weights(matrix, u[j] - low - span, basis)
+        for a in range(order):
+            omega[span + a] += weights[j] * basis[a]
+
+
+@njit(cache=True)
+def merge_run(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    curve: int,
+    u: Vector,
+    points: Points,
+    weights: Vector,
+    max_weight: float,
+    penalty: float,
+) -> int:
+    """Fit points with known parameters on the lattice of a curve and average the fit into it."""
+    degree = matrix.shape[0] - 1
+    low, high = lattice_domain(np.min(u), np.max(u))
+    first, count = low - degree, high - low + degree
+    known, is_known = np.zeros((count, 2)), np.zeros(count)
+    if curve >= 0:
+        shift = level.offset[curve] + first - level.first[curve]
+        for i in range(count):
+            row = shift + i
+            inside = level.offset[curve] <= row < level.offset[curve] + level.count[curve]
+            if inside and level.weights[row] >= USABLE_WEIGHT:
+                known[i] = level.points[row]
+                is_known[i] = 1.0
+    fitted, omega = np.empty((count, 2)), np.empty(count)
+    if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):
+        return curve
+    _observed_share(u, weights, matrix, low, omega)
+    moved = False
+    if curve < 0:
+        curve = _start_curve(level, first, count)
+    else:
+        moved = extend_rows(level, curve, first, first + count)
+    offset = level.offset[curve] + first - level.first[curve]
+    for i in range(count):
+        row = offset + i
+        share = min(1.0, omega[i])
+        old = level.weights[row]
+        if old <= 0.0:
+            level.points[row] = fitted[i]
+            level.weights[row] = max(share, LEAST_WEIGHT)
+        else:
+            new = min(max_weight, old + share)
+            gain = share / max(new, LEAST_WEIGHT)  # the running mean, then a fading one
+            level.points[row, 0] += gain * (fitted[i, 0] - level.points[row, 0])
+            level.points[row, 1] += gain * (fitted[i, 1] - level.points[row, 1])
+            level.weights[row] = new
+    level.support[curve, 0] = min(level.support[curve, 0], np.min(u))
+    level.support[curve, 1] = max(level.support[curve, 1], np.max(u))
+    level.seen[curve] += 1
+    if moved:
+        offset, count = level.offset[curve], level.count[curve]
+    refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
+    return curve
+
+
+@njit(cache=True)
+def _run_parameters(
+    run: NDArray[np.int64],
+    curves: NDArray[np.int64],
+    u: Vector,
+    points: Points,
+    matrix: Points,
+    knot_step_m: float,
+    first_penalty: float,
+    run_u: Vector,
+) -> None:
+    """Parameters of a run: foot points where it is matched, arc length where it is not."""
+    begin, end = run[BEGIN], run[END]
+    known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
+    n = end - begin
+    part = points[begin:end]
+    if known_end == known_begin:
+        chord_length_parameters(part, 0.0, knot_step_m, run_u)
+        anchor = 0
+    else:
+        anchor = known_begin - begin
+        for j in range(known_begin, known_end):
+            run_u[j - begin] = u[j]
+            if curves[j] != run[CURVE]:  # a miss that the run bridges
+                dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
+                run_u[j - begin] = run_u[j - 1 - begin] + math.hypot(dx, dy) / knot_step_m
+        for j in range(known_begin - 1, begin - 1, -1):
+            dx, dy = points[j + 1, 0] - points[j, 0], points[j + 1, 1] - points[j, 1]
+            run_u[j - begin] = run_u[j + 1 - begin] - math.hypot(dx, dy) / knot_step_m
+        for j in range(known_end, end):
+            dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
+            run_u[j - begin] = run_u[j - 1 - begin] + math.hypot(dx, dy) / knot_step_m
+    if known_end - known_begin == n or n < 2:
+        return
+    low, high = lattice_domain(run_u[0], run_u[n - 1])
+    count = high - low + matrix.shape[0] - 1
+    weights, first_fit = np.empty(n), np.empty((count, 2))
+    spacing_weights(run_u, 1.0, weights)
+    none = np.zeros((count, 2))
+    if not fit_control_points(
+        run_u, part, weights, matrix, low, first_penalty, none, np.zeros(count), first_fit
+    ):
+        return
+    arc_u = run_u.copy()
+    arc_length_parameters(arc_u, first_fit, matrix, low, anchor, knot_step_m)
+    for j in range(anchor):
+        run_u[j] = arc_u[j]
+    if known_end > begin:
+        last = known_end - 1 - begin
+        behind = run_u[last] - arc_u[last] if known_end > known_begin else 0.0
+        for j in range(last + 1, n):
+            run_u[j] = arc_u[j] + behind
+    else:
+        run_u[:] = arc_u
+
+
+@njit(cache=True)
+def merge_runs(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    runs: NDArray[np.int64],
+    resume: int,
+    curves: NDArray[np.int64],
+    u: Vector,
+    points: Points,
+    max_weight: float,
+    penalty: float,
+    first_penalty: float,
+) -> int:
+    """Merge the runs from `resume` on; returns the first one that finds no room, or their number."""
+    for r in range(resume, len(runs)):
+        begin, end = runs[r, BEGIN], runs[r, END]
+        curve = runs[r, CURVE]
+        run_u, weights = np.empty(end - begin), np.empty(end - begin)
+        _run_parameters(runs[r], curves, u, points, matrix, knot_step_m, first_penalty, run_u)
+        rows = math.ceil(np.max(run_u) - np.min(run_u)) + 2 * matrix.shape[0]
+        if curve >= 0:
+            rows += level.count[curve]
+        if not has_room(level, 2 * rows + 16):
+            level.sizes[3] = 2 * rows + 16
+            return r
+        spacing_weights(run_u, 1.0, weights)
+        for j in range(runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]):
+            if curves[j] != curve:
+                weights[j - begin] = 0.0
+        merge_run(
+            level,
+            matrix,
+            knot_step_m,
+            curve,
+            run_u,
+            points[begin:end],
+            weights,
+            max_weight,
+            penalty,
+        )
+    return len(runs)

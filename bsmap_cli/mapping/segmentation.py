@@ -2,16 +2,170 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.sensor.gate import Returns
 from bsmap_cli.settings import setting
+
+BEAM_GAPS = 3.0  # neighbours on one surface, seen under 70 degrees from its normal, in beam steps
+NOISE_GAPS = 4.0  # the relative test of eq. (3) counts smaller gaps as this many sigma
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentationSettings:
     """Where one surface ends and the next begins."""
 
-    rel_gap: float = setting(3.0, "a gap this many times the one before it ends a cluster", symbol="gamma_rel", minimum=1.0)
-    max_gap: float = setting(0.7, "a longer gap ends a cluster [knot steps]", symbol="gamma_abs", minimum=0.0)
+    rel_gap: float = setting(
+        3.0, "a gap this many times the one before ends a cluster", symbol="gamma_rel", minimum=1.0
+    )
+    max_gap: float = setting(
+        0.7,
+        "a longer gap ends a cluster [knot steps]; never less than what the beam spacing explains",
+        symbol="gamma_abs",
+        minimum=0.0,
+    )
     min_points: int = setting(5, "smaller clusters are dropped", symbol="gamma_min", minimum=2)
     min_length: float = setting(0.75, "shorter clusters are dropped [knot steps]", minimum=0.0)
+    beam_gap: bool = setting(
+        True, "widen max_gap where beams lie far apart; off: the constant of eq. (3)"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Clusters:
+    """The clusters of one scan at one knot step, thinned, one after the other in beam order.
+
+    points : (n, 2) float64 [m]; tangents : (n, 2) unit vectors in beam order; counts : (n,) raw
+    returns behind each point; starts : (c + 1,) first point of each cluster, and the end.
+    """
+
+    points: Points
+    tangents: Points
+    counts: Vector
+    starts: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+
+@njit(cache=True)
+def _segment(
+    points: Points,
+    ranges: Vector,
+    beam_gap_rad: float,
+    max_gap_m: float,
+    rel_gap: float,
+    sigma_m: float,
+    min_points: int,
+    min_length_m: float,
+    bounds: NDArray[np.int64],
+) -> int:
+    """Write first and end of each cluster into `bounds`; their number."""
+    clusters = 0
+    start = 0
+    length = 0.0
+    previous_gap = math.inf
+    for i in range(1, len(ranges) + 1):
+        gap = math.inf
+        if i < len(ranges):
+            gap = math.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+            widest = max(max_gap_m, beam_gap_rad * min(ranges[i], ranges[i - 1]))
+            floor = max(previous_gap, NOISE_GAPS * sigma_m)
+            if gap <= widest and gap <= rel_gap * floor:  # eq. (3)
+                length += gap
+                previous_gap = gap
+                continue
+        if i - start >= min_points and length >= min_length_m:
+            bounds[clusters, 0] = start
+            bounds[clusters, 1] = i
+            clusters += 1
+        start = i
+        length = 0.0
+        previous_gap = math.inf
+    return clusters
+
+
+@njit(cache=True)
+def _thin(
+    points: Points,
+    bounds: NDArray[np.int64],
+    bin_m: float,
+    thinned: Points,
+    counts: Vector,
+    starts: NDArray[np.int64],
+) -> int:
+    """Average neighbours of a cluster that lie within one bin; the number of points left."""
+    n = 0
+    for c in range(len(bounds)):
+        starts[c] = n
+        i = bounds[c, 0]
+        while i < bounds[c, 1]:
+            x = y = 0.0
+            first = i
+            while i < bounds[c, 1] and (
+                i == first
+                or math.hypot(points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
+                < bin_m
+            ):
+                x += points[i, 0]
+                y += points[i, 1]
+                i += 1
+            counts[n] = i - first
+            thinned[n, 0] = x / counts[n]
+            thinned[n, 1] = y / counts[n]
+            n += 1
+    starts[len(bounds)] = n
+    return n
+
+
+@njit(cache=True)
+def _tangents(points: Points, starts: NDArray[np.int64], reach_m: float, tangents: Points) -> None:
+    """Direction of the surface at each point, over neighbours at least `reach_m` away."""
+    for c in range(len(starts) - 1):
+        low, high = starts[c], starts[c + 1] - 1
+        for i in range(low, high + 1):
+            a = b = i
+            dx = dy = 0.0
+            while math.hypot(dx, dy) < reach_m and (a > low or b < high):
+                a = max(low, a - 1)
+                b = min(high, b + 1)
+                dx = points[b, 0] - points[a, 0]
+                dy = points[b, 1] - points[a, 1]
+            norm = math.hypot(dx, dy) + 1e-300
+            tangents[i, 0] = dx / norm
+            tangents[i, 1] = dy / norm
+
+
+def find_clusters(
+    returns: Returns,
+    settings: SegmentationSettings,
+    *,
+    knot_step_m: float,
+    bin_m: float,
+    sigma_m: float,
+) -> Clusters:
+    """Cut the returns where the surface ends, eq. (3), and thin each cluster into bins."""
+    m = len(returns)
+    bounds = np.empty((m, 2), np.int64)
+    clusters = _segment(
+        returns.points_body,
+        returns.ranges_m,
+        BEAM_GAPS * returns.beam_step_rad if settings.beam_gap else 0.0,
+        settings.max_gap * knot_step_m,
+        settings.rel_gap,
+        sigma_m if settings.beam_gap else 0.0,
+        settings.min_points,
+        settings.min_length * knot_step_m,
+        bounds,
+    )
+    points, counts, tangents = np.empty((m, 2)), np.empty(m), np.empty((m, 2))
+    starts = np.empty(clusters + 1, np.int64)
+    n = _thin(returns.points_body, bounds[:clusters], bin_m, points, counts, starts)
+    _tangents(points, starts, max(0.5 * knot_step_m, 6.0 * sigma_m), tangents)
+    return Clusters(points[:n], tangents[:n], counts[:n], starts)

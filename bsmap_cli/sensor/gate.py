@@ -1,10 +1,20 @@
-"""Which beams of a scan are returns."""
+"""Which beams of a scan are returns, and where they lie in the base frame."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.sensor.scan import Ranges, Scan
 from bsmap_cli.settings import setting
+
+NO_RETURN_SHARE = 0.995  # of range_max: "a hair less" is a code for no return, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,7 +22,147 @@ class SensorSettings:
     """Limits of the sensor, where the log does not state better ones."""
 
     range_min_m: float = setting(0.0, "shorter ranges are not returns", minimum=0.0)
-    range_max_m: float = setting(30.0, "longer ranges are not returns; also where the log states no limit", minimum=0.0)
-    range_sigma_m: float = setting(0.01, "standard deviation of the range noise", minimum=1e-5)
-    ignore_angles_deg: tuple[tuple[float, float], ...] = setting((), "sectors of the laser frame, from, to, in which the robot sees itself")
-    deskew: str = setting("auto", "correct the motion during one sweep", choices=("auto", "off"))
+    range_max_m: float | None = setting(
+        None,
+        "longer ranges are not returns; null: the log's limit, else 300 finest knot steps",
+        minimum=0.0,
+    )
+    range_sigma_m: float | None = setting(
+        None, "deviation of the range noise; null: estimated from the first scan", minimum=1e-6
+    )
+    ignore_angles_deg: tuple[tuple[float, float], ...] = setting(
+        (), "sectors of the laser frame, from and to, in which the robot sees itself"
+    )
+    deskew: str = setting(
+        "auto", "undo the motion during one sweep, or leave it", choices=("auto", "off")
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """The returns of one scan, counter-clockwise.
+
+    points_body : (m, 2) float64 [m], base frame; ranges_m : (m,) [m]; beam_step_rad : angle from
+    one beam to the next; on a full circle the list starts behind the widest gap, so that no
+    surface is cut at the seam.
+    """
+
+    points_body: Points
+    ranges_m: Vector
+    beam_step_rad: float
+
+    def __len__(self) -> int:
+        return len(self.ranges_m)
+
+
+@lru_cache(maxsize=64)
+def _beam_table(
+    first_rad: float, step_rad: float, beams: int, ignored_deg: tuple[tuple[float, float], ...]
+) -> tuple[Vector, Vector, NDArray[np.bool_]]:
+    """Cosine, sine and use of each beam of a scan."""
+    angles = first_rad + np.arange(beams) * step_rad
+    used = np.ones(beams, bool)
+    for start_deg, end_deg in ignored_deg:
+        width = (end_deg - start_deg) % 360.0
+        used &= (np.degrees(angles) - start_deg) % 360.0 > width
+    return np.cos(angles), np.sin(angles), used
+
+
+@njit(cache=True)
+def _gather(
+    ranges: Ranges,
+    cosines: Vector,
+    sines: Vector,
+    used: NDArray[np.bool_],
+    near: float,
+    far: float,
+    laser: Vector,
+    twist: Vector,
+    beam_time: float,
+    points: Points,
+    lengths: Vector,
+) -> int:
+    """Write the returns in the base frame of the first ray's instant; their number."""
+    cos, sin = math.cos(laser[2]), math.sin(laser[2])
+    moving = beam_time != 0.0 and (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0)
+    count = 0
+    beams = len(ranges)
+    for i in range(beams):
+        r = float(ranges[i])
+        if not (used[i] and near <= r <= far):
+            continue
+        x, y = r * cosines[i], r * sines[i]
+        bx = cos * x - sin * y + laser[0]
+        by = sin * x + cos * y + laser[1]
+        if moving:
+            elapsed = beam_time * i if beam_time > 0.0 else beam_time * (i - beams + 1)
+            turn = twist[2] * elapsed
+            c, s = math.cos(turn), math.sin(turn)
+            bx, by = (
+                c * bx - s * by + twist[0] * elapsed,
+                s * bx + c * by + twist[1] * elapsed,
+            )
+        points[count, 0] = bx
+        points[count, 1] = by
+        lengths[count] = r
+        count += 1
+    return count
+
+
+def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tuple[float, float]:
+    """Shortest and longest range [m] that counts as a return of this scan."""
+    far = scan.range_max_m * NO_RETURN_SHARE
+    if not 0.0 < far < math.inf:
+        far = math.inf if settings.range_max_m else 300.0 * knot_step_m
+    if settings.range_max_m:
+        far = min(far, settings.range_max_m)
+    near = max(scan.range_min_m, settings.range_min_m, 1e-3 * knot_step_m)
+    return near, far
+
+
+def find_returns(
+    scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector | None = None
+) -> Returns:
+    """The returns of a scan; `twist_body` (vx, vy [m/s], omega [rad/s]) undoes the sweep's motion."""
+    beams = len(scan.ranges_m)
+    cosines, sines, used = _beam_table(
+        scan.angle_min_rad, scan.angle_increment_rad, beams, settings.ignore_angles_deg
+    )
+    near, far = range_limits(scan, settings, knot_step_m)
+    points, lengths = np.empty((beams, 2)), np.empty(beams)
+    deskew = twist_body is not None and settings.deskew == "auto"
+    count = _gather(
+        scan.ranges_m,
+        cosines,
+        sines,
+        used,
+        near,
+        far,
+        scan.pose_base_laser.as_array(),
+        twist_body if twist_body is not None else np.zeros(3),
+        scan.time_increment_s if deskew else 0.0,
+        points,
+        lengths,
+    )
+    points, lengths = points[:count], lengths[:count]
+    if beams * scan.angle_increment_rad > math.tau - 1.5 * scan.angle_increment_rad and count > 2:
+        gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
+        seam = int(np.argmax(gaps))
+        points, lengths = np.roll(points, -seam, axis=0), np.roll(lengths, -seam)
+    return Returns(points, lengths, scan.angle_increment_rad)
+
+
+def estimate_range_sigma(scan: Scan, settings: SensorSettings, knot_step_m: float) -> float | None:
+    """Deviation of the range noise [m] from second differences of neighbouring ranges.
+
+    A smooth surface leaves next to nothing in a second difference; noise leaves sqrt(6) sigma.
+    The median ignores edges. None where the scan has too few returns to tell.
+    """
+    near, far = range_limits(scan, settings, knot_step_m)
+    ranges = scan.ranges_m.astype(np.float64)
+    ranges[~((ranges >= near) & (ranges <= far))] = np.nan
+    second = ranges[:-2] - 2.0 * ranges[1:-1] + ranges[2:]
+    second = np.abs(second[np.isfinite(second)])
+    if len(second) < 30:
+        return None
+    return float(np.median(second)) / (0.6745 * math.sqrt(6.0))

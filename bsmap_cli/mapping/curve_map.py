@@ -1,0 +1,140 @@
+"""The map while it grows: one set of arrays for each knot step of the ladder."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.level_arrays import LevelArrays
+from bsmap_cli.mapping.map_document import MapLevel
+from bsmap_cli.mapping.span_index import EMPTY, insert_span, remove_span
+
+USABLE_WEIGHT = 0.02  # of all control points of a span that is matched against: the last full span
+
+
+def _empty_level(curves: int, rows: int, cells: int) -> LevelArrays:
+    integers = [np.zeros(curves, np.int64) for _ in range(6)]
+    return LevelArrays(
+        np.zeros(4, np.int64),
+        *integers,
+        np.zeros((curves, 2)),
+        np.zeros((rows, 2)),
+        np.zeros(rows),
+        np.full(rows, -1),
+        np.zeros((rows, 4)),
+        np.full(rows, -1),
+        np.full(rows, -1),
+        np.full(cells, EMPTY),
+        np.full(cells, -1),
+    )
+
+
+@njit(cache=True)
+def refresh_spans(
+    level: LevelArrays, matrix: Points, knot_step_m: float, curve: int, begin: int, end: int
+) -> None:
+    """Index anew the spans of a curve that touch its rows `begin` .. `end` - 1."""
+    degree = matrix.shape[0] - 1
+    offset, count = level.offset[curve], level.count[curve]
+    polynomial = np.empty((degree + 1, 2))
+    first = max(offset, begin - degree)
+    for row in range(first, min(offset + count - degree, end)):
+        span_u = float(level.first[curve] + degree + row - offset)
+        usable = span_u < level.support[curve, 1] and span_u + 1.0 > level.support[curve, 0]
+        for a in range(degree + 1):
+            usable = usable and level.weights[row + a] >= USABLE_WEIGHT
+        if not usable:
+            remove_span(level, row)
+            continue
+        span_polynomial(level.points, row, matrix, polynomial)
+        x0, y0 = polynomial[0, 0], polynomial[0, 1]
+        x1, y1, _, _, _, _ = polynomial_jet(polynomial, 1.0)
+        level.spans[row, 0] = 0.5 * (x0 + x1)
+        level.spans[row, 1] = 0.5 * (y0 + y1)
+        level.spans[row, 2] = 0.5 * (x1 - x0)
+        level.spans[row, 3] = 0.5 * (y1 - y0)
+        insert_span(level, row, knot_step_m)
+
+
+@njit(cache=True)
+def _reindex(level: LevelArrays, matrix: Points, knot_step_m: float) -> None:
+    """Fill an empty hash with all usable spans."""
+    level.sizes[2] = 0
+    level.span_cell[:] = -1
+    for curve in range(level.sizes[0]):
+        begin = level.offset[curve]
+        refresh_spans(level, matrix, knot_step_m, curve, begin, begin + level.count[curve])
+
+
+class CurveMap:
+    """All curves of one knot step; frame: the one in which curves were inserted.
+
+    The state is `arrays`; kernels write into it. `reserve` makes room before they run.
+    """
+
+    def __init__(self, knot_step_m: float, degree: int, *, rows: int = 256) -> None:
+        self.knot_step_m = knot_step_m
+        self.degree = degree
+        self.matrix = basis_matrix(degree)
+        self.arrays = _empty_level(64, rows, 512)
+
+    def __len__(self) -> int:
+        return int(self.arrays.sizes[0])
+
+    def reserve(self, rows: int) -> None:
+        """Make room for `rows` further control points, as many spans and one more curve."""
+        arrays = self.arrays
+        have = len(arrays.weights)
+        if arrays.sizes[1] + rows > have:
+            new = max(2 * have, int(arrays.sizes[1]) + rows)
+            arrays = arrays._replace(
+                points=np.resize(arrays.points, (new, 2)),
+                weights=_grown(arrays.weights, new, 0),
+                owner=_grown(arrays.owner, new, -1),
+                spans=np.resize(arrays.spans, (new, 4)),
+                next_span=_grown(arrays.next_span, new, -1),
+                span_cell=_grown(arrays.span_cell, new, -1),
+            )
+        if arrays.sizes[0] + 1 >= len(arrays.first):
+            new = 2 * len(arrays.first)
+            names = ("first", "count", "offset", "low", "high", "seen")
+            arrays = arrays._replace(
+                support=np.resize(arrays.support, (new, 2)),
+                **{name: _grown(getattr(arrays, name), new, 0) for name in names},
+            )
+        crowded = 2 * (arrays.sizes[2] + rows) > len(arrays.cell_keys)
+        if crowded:
+            need = 4 * (int(arrays.sizes[2]) + rows)
+            cells = 1 << math.ceil(math.log2(need))
+            arrays = arrays._replace(cell_keys=np.full(cells, EMPTY), cell_heads=np.full(cells, -1))
+        self.arrays = arrays
+        if crowded:
+            _reindex(arrays, self.matrix, self.knot_step_m)
+
+    def moved(self, pose_new_old: SE2) -> CurveMap:
+        """The same curves in another frame: exact, only the index is made anew."""
+        arrays = self.arrays
+        other = CurveMap(self.knot_step_m, self.degree)
+        other.arrays = arrays._replace(
+            **{name: getattr(arrays, name).copy() for name in arrays._fields if name != "points"},
+            points=pose_new_old.transform(arrays.points),
+        )
+        other.reindex()
+        return other
+
+    def reindex(self) -> None:
+        """Index all spans anew."""
+        self.arrays.cell_keys[:] = EMPTY
+        self.arrays.cell_heads[:] = -1
+        _reindex(self.arrays, self.matrix, self.knot_step_m)
+
+
+def _grown(array: np.ndarray, size: int, fill: int) -> np.ndarray:
+    larger = np.full((size, *array.shape[1:]), fill, array.dtype)
+    larger[: len(array)] = array
+    return larger

@@ -1,0 +1,79 @@
+"""Insert the clusters of one scan into one level of the map: Algorithm 1, lines 3.1 to 4.2.1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.association import AssociationSettings, match_points
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.fitting import FittingSettings
+from bsmap_cli.mapping.merging import MergingSettings, merge_runs
+from bsmap_cli.mapping.runs import plan_runs
+from bsmap_cli.mapping.segmentation import Clusters, SegmentationSettings
+
+
+def rotate(pose: Vector, vectors: Points) -> Points:
+    """(n, 2) directions of the inner frame, in the outer one."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return vectors @ np.array([[cos, sin], [-sin, cos]])
+
+
+def insert_clusters(
+    curve_map: CurveMap,
+    clusters: Clusters,
+    pose_map_body: Vector,
+    *,
+    segmentation: SegmentationSettings,
+    association: AssociationSettings,
+    fitting: FittingSettings,
+    merging: MergingSettings,
+) -> None:
+    """Match, fit and merge; frame of the map = frame of the pose."""
+    n = len(clusters.points)
+    if n == 0:
+        return
+    step = curve_map.knot_step_m
+    points = rotate(pose_map_body, clusters.points) + pose_map_body[:2]
+    tangents = rotate(pose_map_body, clusters.tangents)
+    curves, u = np.empty(n, np.int64), np.zeros(n)
+    match_points(
+        curve_map.arrays,
+        curve_map.matrix,
+        step,
+        points,
+        tangents,
+        clusters.starts,
+        association.track_dist * step,
+        curves,
+        u,
+    )
+    runs = np.empty((2 * n + 2, 5), np.int64)
+    count = plan_runs(
+        curve_map.arrays,
+        points,
+        clusters.starts,
+        curves,
+        u,
+        step,
+        segmentation.min_length * step,
+        segmentation.min_points,
+        runs,
+    )
+    done = 0
+    while done < count:
+        done = merge_runs(
+            curve_map.arrays,
+            curve_map.matrix,
+            step,
+            runs[:count],
+            done,
+            curves,
+            u,
+            points,
+            float(merging.max_weight),
+            fitting.penalty,
+            fitting.first_penalty,
+        )
+        if done < count:
+            curve_map.reserve(int(curve_map.arrays.sizes[3]))
