@@ -149,7 +149,8 @@ class Route:
         off_rad = wrap_angle(heading - self._pose[2])
         if abs(off_rad) > 1e-9:
             self.turn(math.degrees(off_rad))
-        path = through(points, curvature, limits.turn_acceleration_rad_s2 / speed**2)
+        sharpness = limits.turn_acceleration_rad_s2 / speed**2
+        path = through(points, curvature, sharpness, self._pose[2])
         return self._append(Drive(path, speed, limits.acceleration_m_s2))
 
     def turn(self, angle_deg: float, rate_rad_s: float | None = None) -> Route:

@@ -93,9 +93,12 @@ def _tangent_length(pieces: Sequence[Piece], turn_rad: float) -> float:
     )
 
 
-def through(waypoints: Points, curvature: float, sharpness: float) -> Path:
+def through(
+    waypoints: Points, curvature: float, sharpness: float, heading_rad: float = 0.0
+) -> Path:
     """The path through (m, 2) waypoints [m], every inner corner cut by a bend.
 
+    Headings count whole turns on from `heading_rad`.
     Raises ValueError where two bends would overlap.
     """
     steps = np.diff(waypoints, axis=0)
@@ -120,4 +123,5 @@ def through(waypoints: Points, curvature: float, sharpness: float) -> Path:
             pieces.append(Piece(straight_m, 0.0, 0.0))
         pieces += bend
         used_m = cut_m
-    return join(pieces, np.array([*waypoints[0], headings[0]]))
+    start_rad = headings[0] + math.tau * round((heading_rad - headings[0]) / math.tau)
+    return join(pieces, np.array([*waypoints[0], start_rad]))

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from bsmap_cli.errors import UsageError
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.simulator.grid import Grid, grid_of, single_cell
 from bsmap_cli.sensor.simulator.lidar import LIDARS, LidarModel
 from bsmap_cli.sensor.simulator.motion import Motion
 from bsmap_cli.sensor.simulator.odometry import OdometryModel, odometry_poses
-from bsmap_cli.sensor.simulator.raycast import Grid, cast_rays, grid_of, single_cell
+from bsmap_cli.sensor.simulator.raycast import cast_rays
 from bsmap_cli.sensor.simulator.scenes import SCENES, Scene
 from bsmap_cli.sensor.simulator.world import World
 from bsmap_cli.sensor.trajectory import Trajectory
@@ -56,8 +57,8 @@ class Simulation:
                 ranges_m=self.lidar.measure(self._true_ranges(grid, index), random),
                 angle_min_rad=self.lidar.angle_min_rad,
                 angle_increment_rad=self.lidar.angle_increment_rad,
-                range_min_m=self.lidar.range_min_m,
-                range_max_m=self.lidar.range_max_m,
+                range_min_m=float(np.float32(self.lidar.range_min_m)),
+                range_max_m=float(np.float32(self.lidar.range_max_m)),
                 time_increment_s=self.lidar.time_increment_s if self.sweep else 0.0,
                 pose_base_laser=self.pose_base_laser,
                 pose_odom_base=None

@@ -133,11 +133,12 @@ def gather(parts: Iterable[Shapes]) -> Shapes:
 
 
 def polyline(*corners: Sequence[float], closed: bool = False) -> Shapes:
-    """Straight walls from corner to corner."""
+    """Straight walls from corner to corner; equal neighbours count once."""
     points = np.array(corners, np.float64)
     ends = np.roll(points, -1, axis=0) if closed else points[1:]
     starts = points if closed else points[:-1]
-    return Shapes(np.hstack((starts, ends)), np.zeros((0, 5)))
+    apart = (starts != ends).any(axis=1)
+    return Shapes(np.hstack((starts, ends))[apart], np.zeros((0, 5)))
 
 
 def box(x: float, y: float, width_m: float, depth_m: float, angle_deg: float = 0.0) -> Shapes:
