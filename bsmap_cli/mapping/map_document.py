@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.errors import UsageError
 from bsmap_cli.geometry.curve import Curve
 from bsmap_cli.geometry.se2 import Points, Vector
 
@@ -87,12 +88,28 @@ class MapDocument:
         """The level of the smallest knot step."""
         return self.levels[-1]
 
+    def chosen_levels(self, knot_step_m: float | None = None) -> tuple[MapLevel, ...]:
+        """The level of a knot step, or what makes up one whole map: the finest, or all parts.
+
+        UsageError names the knot steps there are.
+        """
+        if knot_step_m is None:
+            return self.levels if self.parts else self.levels[-1:]
+        found = tuple(
+            level for level in self.levels if abs(level.knot_step_m / knot_step_m - 1.0) < 1e-6
+        )
+        if not found:
+            steps = ", ".join(f"{level.knot_step_m:g}" for level in self.levels)
+            raise UsageError(f"the map has no level of knot step {knot_step_m:g} m: it has {steps}")
+        return found
+
 
 @dataclass(frozen=True, slots=True)
 class LevelSamples:
     """Samples of the drawn parts of a level's curves, in curve order, ascending tau.
 
-    points, tangents : (S, 2) float64, map frame; tangents have unit length.
+    points, tangents : (S, 2) float64, map frame; tangents have unit length, or are (0, 0) where
+        a curve stands still.
     curve : (S,) int64 index into the level; tau_m : (S,) absolute [m]; weight : (S,) mean weight
     of the active control points. A drawn part ends where `curve` changes or `piece` does.
     """
