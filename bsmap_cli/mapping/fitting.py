@@ -16,6 +16,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.settings import setting
 
 RIDGE = 1e-8  # of the largest diagonal entry: keeps unobserved control points defined
+ANCHOR = 1e-4  # of the same, to where a known control point lies
 SNAP = 1e-9  # lattice units: a parameter this close to a knot lies on it
 
 
@@ -100,11 +101,12 @@ def fit_control_points(
     largest = 1e-12
     for i in range(n):
         largest = max(largest, band[i, 0])
+    mean_x, mean_y = np.mean(points[:, 0]), np.mean(points[:, 1])
     for i in range(n):
-        band[i, 0] += RIDGE * largest
-        if is_known[i] > 0.0:
-            solution[i, 0] += RIDGE * largest * known[i, 0]
-            solution[i, 1] += RIDGE * largest * known[i, 1]
+        pull = (ANCHOR if is_known[i] > 0.0 else RIDGE) * largest
+        band[i, 0] += pull
+        solution[i, 0] += pull * (known[i, 0] if is_known[i] > 0.0 else mean_x)
+        solution[i, 1] += pull * (known[i, 1] if is_known[i] > 0.0 else mean_y)
     stencil = (-1.0, 3.0, -3.0, 1.0)
     for i in range(n - 3):
         tx = ty = 0.0

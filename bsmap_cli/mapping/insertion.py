@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.mapping.association import AssociationSettings, match_points
+from bsmap_cli.mapping.association import match_points
 from bsmap_cli.mapping.curve_map import CurveMap
-from bsmap_cli.mapping.fitting import FittingSettings
-from bsmap_cli.mapping.merging import MergingSettings, merge_runs
+from bsmap_cli.mapping.mapping_settings import MappingSettings
+from bsmap_cli.mapping.merging import merge_runs
 from bsmap_cli.mapping.runs import plan_runs
-from bsmap_cli.mapping.segmentation import Clusters, SegmentationSettings
+from bsmap_cli.mapping.segmentation import Clusters
 
 
 def rotate(pose: Vector, vectors: Points) -> Points:
@@ -23,11 +23,7 @@ def insert_clusters(
     curve_map: CurveMap,
     clusters: Clusters,
     pose_map_body: Vector,
-    *,
-    segmentation: SegmentationSettings,
-    association: AssociationSettings,
-    fitting: FittingSettings,
-    merging: MergingSettings,
+    settings: MappingSettings,
 ) -> None:
     """Match, fit and merge; frame of the map = frame of the pose."""
     n = len(clusters.points)
@@ -44,7 +40,7 @@ def insert_clusters(
         points,
         tangents,
         clusters.starts,
-        association.track_dist * step,
+        settings.association.track_dist * step,
         curves,
         u,
     )
@@ -56,8 +52,8 @@ def insert_clusters(
         curves,
         u,
         step,
-        segmentation.min_length * step,
-        segmentation.min_points,
+        settings.segmentation.min_length * step,
+        settings.segmentation.min_points,
         runs,
     )
     done = 0
@@ -71,9 +67,9 @@ def insert_clusters(
             curves,
             u,
             points,
-            float(merging.max_weight),
-            fitting.penalty,
-            fitting.first_penalty,
+            float(settings.merging.max_weight),
+            settings.fitting.penalty,
+            settings.fitting.first_penalty,
         )
         if done < count:
             curve_map.reserve(int(curve_map.arrays.sizes[3]))

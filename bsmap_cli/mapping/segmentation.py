@@ -53,6 +53,21 @@ class Clusters:
     def __len__(self) -> int:
         return len(self.starts) - 1
 
+    def coarser(self, knot_step_m: float, bin_m: float, sigma_m: float) -> Clusters:
+        """The same clusters in wider bins, as a coarser level of the ladder sees them."""
+        n = len(self.points)
+        points, counts, tangents = np.empty((n, 2)), np.empty(n), np.empty((n, 2))
+        starts = np.empty_like(self.starts)
+        bounds = np.stack((self.starts[:-1], self.starts[1:]), axis=1)
+        m = _thin(self.points, self.counts, bounds, bin_m, points, counts, starts)
+        _tangents(points, starts, tangent_reach(knot_step_m, sigma_m), tangents)
+        return Clusters(points[:m], tangents[:m], counts[:m], starts)
+
+
+def tangent_reach(knot_step_m: float, sigma_m: float) -> float:
+    """Over what length [m] the direction of a surface is taken: well beyond the noise."""
+    return max(0.5 * knot_step_m, 6.0 * sigma_m)
+
 
 @njit(cache=True)
 def _segment(
@@ -94,6 +109,7 @@ def _segment(
 @njit(cache=True)
 def _thin(
     points: Points,
+    returns: Vector,
     bounds: NDArray[np.int64],
     bin_m: float,
     thinned: Points,
@@ -106,19 +122,20 @@ def _thin(
         starts[c] = n
         i = bounds[c, 0]
         while i < bounds[c, 1]:
-            x = y = 0.0
+            x = y = total = 0.0
             first = i
             while i < bounds[c, 1] and (
                 i == first
                 or math.hypot(points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
                 < bin_m
             ):
-                x += points[i, 0]
-                y += points[i, 1]
+                x += returns[i] * points[i, 0]
+                y += returns[i] * points[i, 1]
+                total += returns[i]
                 i += 1
-            counts[n] = i - first
-            thinned[n, 0] = x / counts[n]
-            thinned[n, 1] = y / counts[n]
+            counts[n] = total
+            thinned[n, 0] = x / total
+            thinned[n, 1] = y / total
             n += 1
     starts[len(bounds)] = n
     return n
@@ -166,6 +183,6 @@ def find_clusters(
     )
     points, counts, tangents = np.empty((m, 2)), np.empty(m), np.empty((m, 2))
     starts = np.empty(clusters + 1, np.int64)
-    n = _thin(returns.points_body, bounds[:clusters], bin_m, points, counts, starts)
-    _tangents(points, starts, max(0.5 * knot_step_m, 6.0 * sigma_m), tangents)
+    n = _thin(returns.points_body, np.ones(m), bounds[:clusters], bin_m, points, counts, starts)
+    _tangents(points, starts, tangent_reach(knot_step_m, sigma_m), tangents)
     return Clusters(points[:n], tangents[:n], counts[:n], starts)
