@@ -1,0 +1,131 @@
+"""The one place where errors become a line and an exit code.
+
+Exit codes: 0 done; 1 could not; 2 usage or settings; 3 done, but something was lost;
+130 interrupted; 143 and 129 ended by SIGTERM and SIGHUP.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import typer
+
+from bsmap_cli.cli.talk import Talk
+from bsmap_cli.errors import BsmapError, ConfigError, UsageError
+
+DONE, COULD_NOT, USAGE, LOSSES, INTERRUPTED = 0, 1, 2, 3, 130
+
+# The parser's own usage errors; their class has no public name.
+ParserError: type[Exception] = typer.BadParameter.__mro__[1]
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Parse the arguments, run the command and return the exit code; standard output is flushed."""
+    from bsmap_cli.cli.app import build_app
+
+    _turn_signals_into_exceptions()
+    code = guarded(lambda: build_app(arguments)(list(arguments), "bsmap", standalone_mode=False))
+    flushed = guarded(_flush_output)
+    return code or flushed
+
+
+def guarded(action: Callable[[], Any], talk: Talk | None = None) -> int:
+    """Run an action; whatever goes wrong becomes one line and an exit code."""
+    talk = talk or Talk()
+    try:
+        code = action()
+    except (BrokenPipeError, SystemExit) as end:
+        if _pipe_was_closed(end):
+            _discard_output()
+            return DONE
+        return _code(end.code if isinstance(end, SystemExit) else COULD_NOT)
+    except KeyboardInterrupt:
+        talk.error("interrupted")
+        return INTERRUPTED
+    except Exception as error:
+        if talk.level >= 2:
+            traceback.print_exc()
+        talk.error(_one_line(error))
+        usage = isinstance(error, UsageError | ConfigError | ParserError)
+        return USAGE if usage else COULD_NOT
+    return _code(code)
+
+
+def _code(value: object) -> int:
+    return value if isinstance(value, int) else DONE
+
+
+def _one_line(error: Exception) -> str:
+    """What is wrong and what to do next, on one line."""
+    if isinstance(error, BsmapError):
+        text = str(error)
+    elif isinstance(error, ParserError):
+        text = _parser_message(error)
+    elif isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        text += _remedy(error)
+    elif isinstance(error, MemoryError):
+        text = "out of memory: read less with --every or --duration, or set a coarser ladder"
+    else:
+        what = f"{type(error).__name__}: {error}"
+        text = f"this should not have happened ({what}): please report it with the output of -vv"
+    return " ".join(text.split())
+
+
+def _parser_message(error: Any) -> str:
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context else "bsmap"
+    return f"{error.format_message().rstrip('.')}; see `{path} --help`"
+
+
+def _remedy(error: OSError) -> str:
+    import errno
+
+    return {
+        errno.ENOSPC: ": make room, or write elsewhere with --output",
+        errno.EDQUOT: ": make room, or write elsewhere with --output",
+        errno.EROFS: ": write elsewhere with --output",
+    }.get(error.errno or 0, "")
+
+
+def _pipe_was_closed(error: BaseException | None) -> bool:
+    while error is not None:
+        if isinstance(error, BrokenPipeError):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _flush_output() -> None:
+    if sys.stdout is not None and not sys.stdout.closed:
+        sys.stdout.flush()
+
+
+def _discard_output() -> None:
+    """The reader has gone: what is still buffered goes nowhere, and without a word."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.__stdout__, sys.__stderr__):
+        if stream is None:
+            continue
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def _turn_signals_into_exceptions() -> None:
+    """A terminated run cleans up as an interrupted one does: temporary files go."""
+
+    def leave(number: int, _frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, leave)

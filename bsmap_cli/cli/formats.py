@@ -1,0 +1,40 @@
+"""Which format an output gets: said with --format, else known from its extension."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from bsmap_cli.cli.outputs import STDOUT
+from bsmap_cli.errors import UsageError
+
+Kind = TypeVar("Kind", bound=str)
+
+LOG_FORMATS: dict[str, Literal["mcap", "bag", "csv"]] = {
+    ".mcap": "mcap",
+    ".bag": "bag",
+    ".csv": "csv",
+}
+
+
+def chosen_format(path: str, said: str | None, by_extension: Mapping[str, Kind]) -> Kind:
+    """The name of the format.
+
+    Raises
+    ------
+    UsageError : neither --format nor the extension says one of `by_extension`.
+    """
+    known = ", ".join(dict.fromkeys(by_extension.values()))
+    if said is not None:
+        for kind in by_extension.values():
+            if kind == said:
+                return kind
+        raise UsageError(f"no format {said!r}: choose one of {known}")
+    if path == STDOUT:
+        raise UsageError(f"standard output has no extension: give --format ({known})")
+    extension = Path(path).suffix.lower()
+    if extension not in by_extension:
+        ends = ", ".join(by_extension)
+        raise UsageError(f"{path}: the extension names no format: end it in {ends}")
+    return by_extension[extension]

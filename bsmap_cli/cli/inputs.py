@@ -1,0 +1,117 @@
+"""Where input comes from: files, or standard input where it is a pipe."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, BinaryIO
+
+from bsmap_cli.errors import LogError, MapFileError, UsageError
+
+if TYPE_CHECKING:
+    from bsmap_cli.mapping.map_document import MapDocument
+    from bsmap_cli.sensor.trajectory import Trajectory
+
+STDIN = "-"
+
+
+def log_sources(logs: Sequence[str] | None) -> tuple[str, ...]:
+    """The logs to read: what was named, else standard input where something is piped in."""
+    return tuple(logs or ()) or (_piped("LOG"),)
+
+
+def map_source(path: str | None) -> str:
+    """The map to read: what was named, else standard input where something is piped in."""
+    return path if path is not None else _piped("MAP")
+
+
+@contextmanager
+def binary_input(path: str) -> Iterator[BinaryIO]:
+    """An open file, or standard input for `-`.
+
+    Raises
+    ------
+    LogError : the file cannot be opened.
+    """
+    if path == STDIN:
+        if sys.stdin is None:
+            raise UsageError("standard input is closed: name a file")
+        yield sys.stdin.buffer
+        return
+    try:
+        stream = open(path, "rb")  # noqa: SIM115 (closed below; only the opening is guarded)
+    except OSError as error:
+        raise LogError(f"{path}: {error.strerror}: check the path") from error
+    with stream:
+        yield stream
+
+
+@contextmanager
+def text_input(path: str) -> Iterator[Iterator[str]]:
+    """The lines of a text file, plain or packed, or of standard input for `-`.
+
+    Raises
+    ------
+    LogError : the file cannot be opened, is damaged or is not text; other errors of reading get
+        the name of the file in front.
+    """
+    from bsmap_cli.logs.byte_streams import DamagedBytesError, unpack
+
+    with binary_input(path) as stream:
+        try:
+            yield io.TextIOWrapper(unpack(stream), encoding="utf-8-sig")
+        except (UnicodeDecodeError, DamagedBytesError) as error:
+            raise LogError(f"{path}: not a text file: {error}") from error
+        except LogError as error:
+            raise LogError(f"{path}: {error}") from error
+
+
+def read_trajectory(path: str) -> Trajectory:
+    """A TUM trajectory; LogError where it cannot be read."""
+    from bsmap_cli.exchange.tum import read_tum
+
+    with text_input(path) as lines:
+        return read_tum(lines)
+
+
+def read_map_file(path: str) -> tuple[MapDocument, int]:
+    """A map and the bytes of its file; MapFileError names the file and the byte at fault."""
+    from bsmap_cli.mapping.map_file import read_map
+
+    with binary_input(path) as stream:
+        counted = _Counted(stream)
+        try:
+            document = read_map(io.BufferedReader(counted))
+        except MapFileError as error:
+            raise MapFileError(f"{path}: {error}") from error
+        return document, counted.count
+
+
+class _Counted(io.RawIOBase):
+    """A stream that counts what is read from it: a pipe has no size to ask for."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.count = 0
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
+        data = self._stream.read(len(buffer))
+        buffer[: len(data)] = data
+        self.count += len(data)
+        return len(data)
+
+
+def _piped(metavar: str) -> str:
+    """`-` where standard input is a pipe, a socket or a redirected file."""
+    if sys.stdin is not None:
+        mode = os.fstat(sys.stdin.fileno()).st_mode
+        if stat.S_ISFIFO(mode) or stat.S_ISREG(mode) or stat.S_ISSOCK(mode):
+            return STDIN
+    raise UsageError(f"missing {metavar}: name one, or pipe it in")

@@ -1,0 +1,45 @@
+"""What was lost on the way, and what that does to the exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from bsmap_cli.cli.door import DONE, LOSSES
+from bsmap_cli.cli.talk import Talk
+from bsmap_cli.errors import LogError
+
+if TYPE_CHECKING:
+    from bsmap_cli.logs.reader import ReadReport
+
+
+def tell_warnings(report: ReadReport, talk: Talk) -> None:
+    """Say what the reader found worth a word."""
+    for warning in report.warnings:
+        talk.warn(warning)
+
+
+def reading_losses(report: ReadReport) -> tuple[str, ...]:
+    """One line each for what could not be read."""
+    losses = []
+    if report.scans_skipped:
+        losses.append(f"{report.scans_skipped} scans could not be read")
+    if report.truncated:
+        losses.append("part of the log is missing or damaged; what it holds was used")
+    return tuple(losses)
+
+
+def exit_code(losses: Sequence[str], *, strict: bool, talk: Talk) -> int:
+    """0, or 3 with the losses on standard error.
+
+    Raises
+    ------
+    LogError : something was lost and the user wants all or nothing.
+    """
+    if not losses:
+        return DONE
+    if strict:
+        raise LogError(f"{'; '.join(losses)}; nothing is written because of --strict")
+    for loss in losses:
+        talk.warn(loss)
+    return LOSSES

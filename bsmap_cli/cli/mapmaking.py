@@ -1,0 +1,178 @@
+"""What `slam` and `map` have in common: a log in, a map and a trajectory out, a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from io import BytesIO, StringIO
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bsmap_cli.cli.inputs import STDIN
+from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
+from bsmap_cli.cli.options import (
+    Force,
+    Json,
+    ReadFlags,
+    SensorFlags,
+    SettingsFlags,
+    Strict,
+    TrajectoryOut,
+    option,
+)
+from bsmap_cli.cli.outputs import STDOUT, Outputs
+from bsmap_cli.cli.report import print_json, size
+from bsmap_cli.cli.talk import Talk
+from bsmap_cli.errors import UsageError
+
+if TYPE_CHECKING:
+    from bsmap_cli.config import Settings
+    from bsmap_cli.logs.reader import LogReader
+    from bsmap_cli.mapping.map_document import MapDocument
+    from bsmap_cli.pipeline import Progress, Run
+
+Work = Callable[["LogReader", "Settings", "Progress"], "Run"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MakingFlags:
+    """Where the results go and in which form."""
+
+    output: Annotated[
+        str, option("--output", "-o", metavar="MAP", help="The map file; `-`: stdout.")
+    ]
+    traj: TrajectoryOut = None
+    levels: Annotated[
+        str,
+        option(
+            "--levels",
+            metavar="finest|all|STEP,...",
+            help="Which knot steps of the ladder are written.",
+        ),
+    ] = "finest"
+    compress: Annotated[
+        bool, option("--compress", help="Write 3 bytes a control point, not 9 (rounds to 1 mm).")
+    ] = False
+    no_path: Annotated[
+        bool,
+        option("--no-path", help="Leave the thinned path out of the map (no free space then)."),
+    ] = False
+    force: Force = False
+    strict: Strict = False
+    json: Json = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogFlags:
+    """All that says what is read and how it is used."""
+
+    logs: tuple[str, ...]
+    beside: tuple[str, ...] = ()  # other inputs, which no output may replace
+    read: ReadFlags
+    settings: SettingsFlags
+    sensor: SensorFlags
+
+
+def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
+    """Run `work` over the log, write what it made and report; the exit code."""
+    from bsmap_cli.cli.progress import progress_bar
+    from bsmap_cli.evaluation.map_quality import map_report
+    from bsmap_cli.exchange.tum import write_tum
+    from bsmap_cli.logs.open_log import open_log
+    from bsmap_cli.mapping.map_file import write_map
+    from bsmap_cli.pipeline import completed
+
+    began = perf_counter()
+    if making.json and STDOUT in (making.output, making.traj):
+        raise UsageError("--json and an output on standard output do not go together: name a file")
+    with Outputs(force=making.force, inputs=(*log.logs, *log.beside)) as outputs:
+        map_out = outputs.add(making.output, binary=True)
+        traj_out = outputs.add(making.traj) if making.traj is not None else None
+        settings = log.settings.settings(log.sensor.overrides())
+        options = log.read.options()
+        with open_log(log.logs, options) as reader, progress_bar(talk, options.max_scans) as bar:
+            run = work(reader, settings, bar)
+        tell_warnings(reader.report, talk)
+        losses = (*reading_losses(reader.report), *run.losses)
+        code = exit_code(losses, strict=making.strict, talk=talk)
+        write_began = perf_counter()
+        document = with_levels(run.document, making.levels)
+        document = replace(document, meta={**document.meta, "logs": _describe(log.logs)})
+        encoded = BytesIO()
+        write_map(encoded, document, compress=making.compress, with_path=not making.no_path)
+        map_out.open().write(encoded.getbuffer())
+        if traj_out is not None:
+            text = StringIO()
+            write_tum(text, run.trajectory)
+            traj_out.open().write(text.getvalue().encode())
+    ended = perf_counter()
+    report = completed(
+        run,
+        seconds=ended - began,
+        write_s=ended - write_began,
+        map_report=map_report(document, file_bytes=encoded.tell()),
+    )
+    if making.json:
+        print_json(report)
+    talk.detail(stage_line(report))
+    talk.note(summary_line(report))
+    return code
+
+
+def with_levels(document: MapDocument, wanted: str) -> MapDocument:
+    """The document with the levels that `--levels` asks for.
+
+    Raises
+    ------
+    UsageError : a knot step that the ladder does not have.
+    """
+    if wanted == "all":
+        return document
+    if wanted == "finest":
+        return replace(document, levels=document.levels[-1:])
+    by_step = {f"{level.knot_step_m:g}": level for level in document.levels}
+    try:
+        steps = [f"{float(part):g}" for part in wanted.split(",")]
+        levels = {step: by_step[step] for step in steps}
+    except (ValueError, KeyError) as error:
+        raise UsageError(
+            f"--levels {wanted}: give finest, all, or steps of the ladder ({', '.join(by_step)})"
+        ) from error
+    coarse_to_fine = sorted(levels.values(), key=lambda level: -level.knot_step_m)
+    return replace(document, levels=tuple(coarse_to_fine))
+
+
+def summary_line(report: dict[str, Any]) -> str:
+    """The last line of a run."""
+    pace = report["realtime_factor"]
+    parts = [
+        f"{report['scans']} scans",
+        f"{report['seconds']:.1f} s",
+        f"{pace:.0f} x real time" if pace is not None else "real time unknown",
+        f"{report['scans_skipped']} skipped",
+        f"{report['loops']} loops closed",
+        f"map {size(report['map']['file_bytes'])}",
+    ]
+    return ", ".join(parts)
+
+
+def stage_line(report: dict[str, Any]) -> str:
+    """Where the time went."""
+    stages = report["stage_seconds"].items()
+    return "seconds: " + ", ".join(f"{name} {seconds:.2f}" for name, seconds in stages)
+
+
+def _describe(logs: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Name and size of each log, no path; what came through a pipe has no name."""
+    return [
+        {"name": "standard input"}
+        if log == STDIN
+        else {"name": Path(log).resolve().name, "bytes": _bytes_of(Path(log))}
+        for log in logs
+    ]
+
+
+def _bytes_of(path: Path) -> int:
+    parts = path.rglob("*") if path.is_dir() else [path]
+    return sum(part.stat().st_size for part in parts if part.is_file())

@@ -1,0 +1,65 @@
+"""Reports on standard output: one JSON document, or lines a person reads."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+from bsmap_cli.cli.talk import BOLD, Talk
+from bsmap_cli.errors import UsageError
+
+
+def print_json(document: Any) -> None:
+    """One document, keys in the order of the report; what is not finite becomes null."""
+    text = json.dumps(_json_value(document), indent=2, ensure_ascii=False, allow_nan=False)
+    print_text(text + "\n")
+
+
+def print_rows(rows: Iterable[tuple[str, str]], talk: Talk) -> None:
+    """`name   value` lines, the values in one column."""
+    rows = list(rows)
+    width = max((len(name) for name, _ in rows), default=0)
+    for name, value in rows:
+        print_text(f"{talk.paint(name.ljust(width), BOLD, sys.stdout)}  {value}".rstrip() + "\n")
+
+
+def print_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]], talk: Talk) -> None:
+    """A table with a header; columns as wide as their widest cell."""
+    lines = [header, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+    for number, line in enumerate(lines):
+        text = "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        text = text.rstrip()
+        print_text((talk.paint(text, BOLD, sys.stdout) if number == 0 else text) + "\n")
+
+
+def print_text(text: str) -> None:
+    """Text on standard output."""
+    if sys.stdout is None:
+        raise UsageError("standard output is closed: there is nowhere to print")
+    sys.stdout.write(text)
+
+
+def size(count: float) -> str:
+    """A number of bytes as a person reads it."""
+    for unit in ("B", "kB", "MB"):
+        if count < 1000:
+            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
+        count /= 1000
+    return f"{count:.1f} GB"
+
+
+def _json_value(value: Any) -> Any:
+    """Plain JSON: numpy scalars become numbers, tuples lists."""
+    if isinstance(value, dict):
+        return {str(key): _json_value(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_value(entry) for entry in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
