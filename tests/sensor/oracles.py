@@ -1,6 +1,5 @@
 """Slow and obvious re-makings of what the simulator computes."""
 
-import itertools
 import math
 
 import numpy as np
@@ -47,12 +46,14 @@ def hit_arc(row, origin, ahead):
 
 def distances_to(polylines, points):
     """(m,) distance from each point to the nearest of the polylines."""
-    best = np.full(len(points), math.inf)
-    for line in polylines:
-        for start, end in itertools.pairwise(line):
-            along = end - start
-            share = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
-            best = np.minimum(best, np.linalg.norm(start + share[:, None] * along - points, axis=1))
+    starts = np.concatenate([line[:-1] for line in polylines])
+    along = np.concatenate([np.diff(line, axis=0) for line in polylines])
+    squares = (along**2).sum(axis=1)
+    best = np.empty(len(points))
+    for index, point in enumerate(points):
+        share = np.clip(((point - starts) * along).sum(axis=1) / squares, 0.0, 1.0)
+        foot = starts + share[:, None] * along
+        best[index] = np.hypot(*(foot - point).T).min()
     return best
 
 

@@ -105,23 +105,26 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Legs one after the other; at rest before and after."""
+    """Legs one after the other; at rest before and after.
+
+    ends_s : when each leg ends, counted from the first one's begin.
+    """
 
     legs: tuple[Leg, ...]
+    ends_s: Vector
 
     @property
     def duration_s(self) -> float:
         """From the first leg's begin to the last one's end."""
-        return sum(leg.duration_s for leg in self.legs)
+        return float(self.ends_s[-1])
 
     def poses(self, times_s: Vector) -> NDArray[np.float64]:
         """(m, 3) x, y [m], heading [rad], not wrapped, at simulated times."""
-        ends = np.cumsum([leg.duration_s for leg in self.legs])
-        leg_of = np.minimum(np.searchsorted(ends, times_s, side="right"), len(self.legs) - 1)
+        leg_of = np.minimum(np.searchsorted(self.ends_s, times_s, side="right"), len(self.legs) - 1)
         poses = np.empty((len(times_s), 3))
         for index in np.unique(leg_of):
             chosen = leg_of == index
-            begin_s = ends[index] - self.legs[index].duration_s
+            begin_s = self.ends_s[index] - self.legs[index].duration_s
             poses[chosen] = self.legs[index].poses(times_s[chosen] - begin_s)
         return poses
 
@@ -166,7 +169,7 @@ class Route:
 
     def motion(self) -> Motion:
         """Everything so far."""
-        return Motion(tuple(self._legs))
+        return Motion(tuple(self._legs), np.cumsum([leg.duration_s for leg in self._legs]))
 
     def _append(self, leg: Leg) -> Route:
         self._legs.append(leg)
