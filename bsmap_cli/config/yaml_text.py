@@ -21,7 +21,7 @@ class Given:
 def read_override(override: str) -> Given:
     """`key=value`, the value in YAML."""
     key, equals, text = override.partition("=")
-    place = f"--set {override}"
+    place = f"--set {' '.join(override.split())}"
     if not equals or not key.strip():
         raise ConfigError(f"{place}: write key=value, such as segmentation.rel_gap=3")
     node = _compose(text, place, numbered=False)
@@ -57,7 +57,7 @@ def _flattened(
         if key in seen:
             raise ConfigError(f"{where}: {key} is given twice")
         seen.add(key)
-        if key in sections:
+        if key in sections or (isinstance(value, yaml.MappingNode) and value.value):
             yield from _flattened(value, place, sections, prefix=f"{key}.", seen=seen)
         else:
             yield Given(key, value, where)
