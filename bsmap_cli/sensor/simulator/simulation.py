@@ -142,7 +142,7 @@ def simulate(
         kept = _key_frames(poses, step_m)
         stamps_ns, poses = stamps_ns[kept], poses[kept]
         wheels = None if wheels is None else wheels[kept]
-    poses[:, 2] = -((-poses[:, 2] + math.pi) % math.tau - math.pi)  # (-pi, pi]
+    poses[:, 2] = 0.0 - ((math.pi - poses[:, 2]) % math.tau - math.pi)  # (-pi, pi]
     return Simulation(
         scene=scene,
         lidar=model,
