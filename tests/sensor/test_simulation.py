@@ -7,6 +7,7 @@ import pytest
 from bsmap_cli.errors import UsageError
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.simulator.grid import grid_of, single_cell
+from bsmap_cli.sensor.simulator.lidar import LIDARS
 from bsmap_cli.sensor.simulator.raycast import cast_rays
 from bsmap_cli.sensor.simulator.scenes import SCENES
 from bsmap_cli.sensor.simulator.simulation import FIRST_STAMP_NS, simulate
@@ -80,6 +81,21 @@ def test_every_scene_can_be_seen(scene, lidar):
     assert len(shares) >= 3
     assert min(shares) > (0.1 if lidar == "lms200" or scene != "campus" else 0.0)
     assert len(simulation) == len(simulation.truth) == sum(1 for _ in simulation.scans())
+
+
+@pytest.mark.parametrize("lidar", LIDARS)
+def test_noisy_end_points_scatter_about_the_surfaces_as_the_lidar_says(lidar):
+    """Median distance of a Gaussian's half: 0.6745 sigma, less where walls are seen aslant."""
+    simulation = simulate("loop", lidar=lidar, rate_hz=0.1, seed=2)
+    walls = [surface.points for surface in simulation.world.surfaces()]
+    model, distances = LIDARS[lidar], []
+    for index, scan in spread(simulation, 8):
+        pose = SE2.from_array(simulation.truth.poses[index])
+        distances.append(distances_to(walls, pose.transform(end_points(scan))))
+    off = np.concatenate(distances)
+    assert 0.2 * model.range_sigma_m < np.median(off) < 1.5 * model.range_sigma_m
+    stray = np.mean(off > 0.15)
+    assert 0.3 * model.outlier_share <= stray <= 1.5 * model.outlier_share
 
 
 def test_same_seed_same_scans_other_seed_other_scans():
@@ -164,8 +180,9 @@ def test_key_frames_lie_a_step_apart():
     [
         ({"scene": "moon"}, "unknown scene 'moon': choose one of wall, spin"),
         ({"scene": "wall", "lidar": "sonar"}, "unknown lidar 'sonar': choose one of ust10lx"),
-        ({"scene": "wall", "noise_m": -0.1}, "range_sigma_m is -0.1"),
-        ({"scene": "wall", "noise_m": math.nan}, "range_sigma_m is nan"),
+        ({"scene": "wall", "noise_m": -0.1}, "noise_m is -0.1: give a finite number"),
+        ({"scene": "wall", "noise_m": math.nan}, "noise_m is nan"),
+        ({"scene": "wall", "seed": -1}, "seed is -1"),
         ({"scene": "wall", "rate_hz": 0.0}, "rate_hz is 0: ust10lx does up to 40"),
         ({"scene": "wall", "rate_hz": 100.0}, "rate_hz is 100: ust10lx does up to 40"),
     ],

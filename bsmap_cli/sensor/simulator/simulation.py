@@ -31,7 +31,8 @@ class Simulation:
 
     truth : base poses in the world frame, one a scan.
     odometry : (m, 3) x, y [m], yaw [rad] in the frame of the first base pose, or None.
-    sweep : the base moves while the mirror turns; otherwise a scan is taken in one instant.
+    sweep : the base moves while the mirror turns; otherwise a scan is taken in one instant. What
+        walks through the scene stands still during a scan either way.
     """
 
     scene: str
@@ -120,6 +121,15 @@ def simulate(
     ------
     UsageError : unknown scene or lidar, or a number out of its range.
     """
+    _refuse_negative(
+        seed=seed,
+        noise_m=noise_m,
+        rate_hz=rate_hz,
+        step_m=step_m,
+        outlier_share=outlier_share,
+        dropout_share=dropout_share,
+        resolution_m=resolution_m,
+    )
     plan = _scene(scene)
     model = _model(
         lidar,
@@ -156,6 +166,12 @@ def simulate(
     )
 
 
+def _refuse_negative(**numbers: float | None) -> None:
+    for name, value in numbers.items():
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise UsageError(f"{name} is {value:g}: give a finite number that is not negative")
+
+
 def _scene(name: str) -> Scene:
     if name not in SCENES:
         raise UsageError(f"unknown scene '{name}': choose one of {', '.join(SCENES)}")
@@ -167,9 +183,6 @@ def _model(name: str, **changes: float | None) -> LidarModel:
     if name not in LIDARS:
         raise UsageError(f"unknown lidar '{name}': choose one of {', '.join(LIDARS)}")
     given = {key: value for key, value in changes.items() if value is not None}
-    for key, value in given.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise UsageError(f"{key} is {value:g}: give a finite number that is not negative")
     model = replace(LIDARS[name], **given)  # type: ignore[arg-type]
     fastest_hz = 1.0 / model.turn_s
     if not 0.0 < model.rate_hz <= fastest_hz * (1.0 + 1e-9):
