@@ -13,7 +13,7 @@ from bsmap_cli import __version__
 from bsmap_cli.cli.command import command
 from bsmap_cli.cli.help import GroupedCommand
 
-VERBS = ("sim", "config")
+VERBS = ("eval", "plot", "sim", "config")
 
 HELP = """Turn logs of 2D range scans into compact B-spline maps and trajectories.
 
@@ -21,9 +21,9 @@ A log is an MCAP file, a ROS 1 bag, a ROS 2 bag directory, a CARMEN log or a CSV
 format is known from its content. `-` is standard input or output.
 
 \b
-  bsmap slam run.mcap -o map.bsm --traj map.tum    a map and a trajectory
-  bsmap stats map.bsm                              what the map holds
-  bsmap plot map.bsm --traj map.tum -o map.png     a picture of both
+  bsmap slam run.mcap -o map.bsm --traj map.tum  # a map and a trajectory
+  bsmap stats map.bsm                            # what the map holds
+  bsmap plot map.bsm --traj map.tum -o map.png   # a picture of both
 
 Exit codes: 0 done; 1 could not; 2 usage or settings; 3 done, but something was lost;
 130 interrupted.

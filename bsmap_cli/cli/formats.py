@@ -16,6 +16,11 @@ LOG_FORMATS: dict[str, Literal["mcap", "bag", "csv"]] = {
     ".bag": "bag",
     ".csv": "csv",
 }
+PICTURE_FORMATS: dict[str, Literal["png", "svg", "pdf"]] = {
+    ".png": "png",
+    ".svg": "svg",
+    ".pdf": "pdf",
+}
 
 
 def chosen_format(path: str, said: str | None, by_extension: Mapping[str, Kind]) -> Kind:

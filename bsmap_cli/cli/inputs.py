@@ -87,7 +87,8 @@ def read_map_file(path: str) -> tuple[MapDocument, int]:
         try:
             document = read_map(io.BufferedReader(counted))
         except MapFileError as error:
-            raise MapFileError(f"{path}: {error}") from error
+            name = "standard input" if path == STDIN else path
+            raise MapFileError(f"{name}: {error}") from error
         return document, counted.count
 
 

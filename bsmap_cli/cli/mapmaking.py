@@ -127,20 +127,16 @@ def with_levels(document: MapDocument, wanted: str) -> MapDocument:
     ------
     UsageError : a knot step that the ladder does not have.
     """
-    if wanted == "all":
+    if wanted == "all" or document.parts:
         return document
     if wanted == "finest":
-        return replace(document, levels=document.levels[-1:])
-    by_step = {f"{level.knot_step_m:g}": level for level in document.levels}
+        return replace(document, levels=document.chosen_levels())
     try:
-        steps = [f"{float(part):g}" for part in wanted.split(",")]
-        levels = {step: by_step[step] for step in steps}
-    except (ValueError, KeyError) as error:
-        raise UsageError(
-            f"--levels {wanted}: give finest, all, or steps of the ladder ({', '.join(by_step)})"
-        ) from error
-    coarse_to_fine = sorted(levels.values(), key=lambda level: -level.knot_step_m)
-    return replace(document, levels=tuple(coarse_to_fine))
+        steps = sorted({float(part) for part in wanted.split(",")}, reverse=True)
+    except ValueError as error:
+        raise UsageError(f"--levels {wanted}: give finest, all or knot steps [m]") from error
+    chosen = (level for step in steps for level in document.chosen_levels(step))
+    return replace(document, levels=tuple(chosen))
 
 
 def summary_line(report: dict[str, Any]) -> str:

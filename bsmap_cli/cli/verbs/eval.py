@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bsmap_cli.cli.formats import PICTURE_FORMATS, chosen_format
 from bsmap_cli.cli.inputs import read_trajectory, text_input
-from bsmap_cli.cli.options import Json, TalkFlags, option
+from bsmap_cli.cli.options import Force, Json, TalkFlags, option
+from bsmap_cli.cli.outputs import Outputs
 from bsmap_cli.cli.report import print_json, print_rows
 from bsmap_cli.errors import UsageError
+
+if TYPE_CHECKING:
+    from bsmap_cli.evaluation.trajectory_error import AbsoluteError
 
 
 def run(
@@ -38,6 +43,11 @@ def run(
         float,
         option("--delta", metavar="M", min=1e-6, help="Length of the motions that RPE compares."),
     ] = 1.0,
+    plot: Annotated[
+        str | None,
+        option("--plot", metavar="FILE", help="Also draw the error over time: .png, .svg or .pdf."),
+    ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Judge a trajectory by a reference, or by relations between its poses.
@@ -53,25 +63,44 @@ def run(
     """
     if (reference is None) == (relations is None):
         raise UsageError("give a reference trajectory REF, or --relations FILE: one of the two")
-    if relations is None:
-        assert reference is not None
-        report = _against_reference(estimate, reference, max_dt, delta)
-    else:
+    if relations is not None:
+        if plot is not None:
+            raise UsageError("--plot draws the error against REF, not against relations")
         report = _against_relations(estimate, relations)
+    elif reference is not None:
+        with Outputs(force=force, inputs=(estimate, reference)) as outputs:
+            picture = _Picture(outputs, plot) if plot is not None else None
+            report = _against_reference(estimate, reference, max_dt, delta, picture)
     if json:
         print_json(report)
     else:
         print_rows(_rows(report), talk.talk())
 
 
+class _Picture:
+    """Where the picture of the error goes, refused at once where it cannot go there."""
+
+    def __init__(self, outputs: Outputs, path: str) -> None:
+        self._kind = chosen_format(path, None, PICTURE_FORMATS)
+        self._target = outputs.add(path)
+
+    def draw(self, error: AbsoluteError) -> None:
+        from bsmap_cli.plotting import plot_error, save_figure
+
+        save_figure(plot_error(error), self._target.open(), self._kind)
+
+
 def _against_reference(
-    estimate: str, reference: str, max_dt_s: float, delta_m: float
+    estimate: str, reference: str, max_dt_s: float, delta_m: float, picture: _Picture | None
 ) -> dict[str, Any]:
     from bsmap_cli.evaluation.trajectory_error import absolute_error, match_poses, relative_error
 
     matched = match_poses(read_trajectory(estimate), read_trajectory(reference), max_dt_s=max_dt_s)
+    absolute = absolute_error(matched)
+    if picture is not None:
+        picture.draw(absolute)
     return {
-        "ate": absolute_error(matched).as_json(),
+        "ate": absolute.as_json(),
         "rpe": relative_error(matched, delta_m=delta_m).as_json(),
         "matched": len(matched.stamps_ns),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -11,14 +12,27 @@ from bsmap_cli.cli.options import Force, TalkFlags, option
 from bsmap_cli.cli.outputs import Outputs
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImitationFlags:
+    """How the sensors are imitated."""
+
+    lidar: Annotated[str, option("--lidar", metavar="NAME", help="The lidar that is imitated.")] = (
+        "ust10lx",
+    )
+    noise: Annotated[
+        float | None,
+        option("--noise", metavar="M", min=0.0, help="Range noise [m], instead of the lidar's."),
+    ] = (None,)
+    seed: Annotated[int, option("--seed", metavar="N", min=0, help="Of all that is random.")] = (0,)
+    no_odom: Annotated[bool, option("--no-odom", help="Leave odometry out of the log.")] = (False,)
+
+
 def run(
     *,
     talk: TalkFlags,
     scene: Annotated[
         str,
-        typer.Argument(
-            metavar="SCENE", help="wall, spin, shapes, loop, corridor, twins; see below."
-        ),
+        typer.Argument(metavar="SCENE", help="One of the scenes above."),
     ],
     output: Annotated[
         str,
@@ -32,15 +46,7 @@ def run(
         str | None,
         option("--surfaces", metavar="FILE", help="Also write the true surfaces (GeoJSON)."),
     ] = None,
-    lidar: Annotated[
-        str, option("--lidar", metavar="ust10lx|lms200", help="The sensor that is imitated.")
-    ] = "ust10lx",
-    noise: Annotated[
-        float | None,
-        option("--noise", metavar="M", min=0.0, help="Range noise [m], instead of the lidar's."),
-    ] = None,
-    seed: Annotated[int, option("--seed", metavar="N", min=0, help="Of all that is random.")] = 0,
-    no_odom: Annotated[bool, option("--no-odom", help="Leave odometry out of the log.")] = False,
+    imitation: ImitationFlags,
     format_: Annotated[
         str | None,
         option(
@@ -56,12 +62,20 @@ def run(
 
     \b
     Scenes:
-      wall      follow a wall, translating (the paper's first mission)
-      spin      360 degrees on the spot (the paper's second)
-      shapes    different geometric shapes in one room
-      loop      a ring of corridors with doors and pillars, twice round
-      corridor  bare parallel walls
+      wall      12 m along a wall with niches and pilasters
+      spin      360 degrees on the spot in a room
+      shapes    geometric shapes in a room of 10 m by 8 m
+      loop      a ring of corridors, 30 m by 20 m, twice round
+      corridor  bare parallel walls without an end in sight
       twins     two identical rooms joined by a corridor
+      hallway   a corridor of 110 m between two lobbies, and back
+      office    a corridor and the furnished rooms beside it
+      campus    2 km round a campus
+      people    a hall through which people walk
+      yard      a loading yard with vans that come and go
+      changes   a room where a box is taken away half way
+
+    Lidars: ust10lx, utm30lx, lms200, lms200half, urg04lx, lowcost360.
 
     \b
     Example:
@@ -78,7 +92,13 @@ def run(
         kind = chosen_format(output, format_, LOG_FORMATS)
         log = outputs.add(output, binary=kind != "csv", stream=True)
         beside = [outputs.add(path) if path else None for path in (truth, surfaces)]
-        made = simulate(scene, lidar=lidar, noise_m=noise, seed=seed, odometry=not no_odom)
+        made = simulate(
+            scene,
+            lidar=imitation.lidar,
+            noise_m=imitation.noise,
+            seed=imitation.seed,
+            odometry=not imitation.no_odom,
+        )
         count = write_log(log.open(), made.scans(), kind)
         if beside[0]:
             text = StringIO()
@@ -86,4 +106,4 @@ def run(
             beside[0].open().write(text.getvalue().encode())
         if beside[1]:
             beside[1].open().write(surfaces_geojson(made.world.surfaces()).encode())
-    talk.talk().note(f"{count} scans of {made.lidar.beams} beams, seed {seed}")
+    talk.talk().note(f"{count} scans of {made.lidar.beams} beams, seed {made.seed}")
