@@ -19,16 +19,16 @@ class LookFlags:
     level: Annotated[
         float | None,
         option("--level", metavar="STEP", help="Draw the level of this knot step [m]."),
-    ] = (None,)
+    ] = None
     color_by: Annotated[
         Literal["weight", "curve", "level"],
         option("--color-by", metavar="weight|curve|level", help="What the color of a curve tells."),
-    ] = ("weight",)
-    dark: Annotated[bool, option("--dark", help="Light on dark.")] = (False,)
+    ] = "weight"
+    dark: Annotated[bool, option("--dark", help="Light on dark.")] = False
     control_points: Annotated[bool, option("--control-points", help="Mark the control points.")] = (
-        False,
+        False
     )
-    knots: Annotated[bool, option("--knots", help="Mark the knots.")] = (False,)
+    knots: Annotated[bool, option("--knots", help="Mark the knots.")] = False
 
 
 def run(

@@ -17,14 +17,14 @@ class ImitationFlags:
     """How the sensors are imitated."""
 
     lidar: Annotated[str, option("--lidar", metavar="NAME", help="The lidar that is imitated.")] = (
-        "ust10lx",
+        "ust10lx"
     )
     noise: Annotated[
         float | None,
         option("--noise", metavar="M", min=0.0, help="Range noise [m], instead of the lidar's."),
-    ] = (None,)
-    seed: Annotated[int, option("--seed", metavar="N", min=0, help="Of all that is random.")] = (0,)
-    no_odom: Annotated[bool, option("--no-odom", help="Leave odometry out of the log.")] = (False,)
+    ] = None
+    seed: Annotated[int, option("--seed", metavar="N", min=0, help="Of all that is random.")] = 0
+    no_odom: Annotated[bool, option("--no-odom", help="Leave odometry out of the log.")] = False
 
 
 def run(
