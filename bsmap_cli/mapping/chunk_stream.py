@@ -103,11 +103,12 @@ class ChunkReader:
 
 
 class ChunkWriter:
-    """Writes the magic and then chunks, keeping the crc of all bytes written."""
+    """Writes the magic and then chunks, keeping count and crc of all bytes written."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
         self.file_crc = 0
+        self.file_bytes = 0
         self._write(MAGIC)
 
     def chunk(self, type_: bytes, payload: bytes) -> None:
@@ -124,4 +125,5 @@ class ChunkWriter:
 
     def _write(self, data: bytes) -> None:
         self._stream.write(data)
+        self.file_bytes += len(data)
         self.file_crc = zlib.crc32(data, self.file_crc)

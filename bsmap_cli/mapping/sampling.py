@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,17 +61,22 @@ def evaluate(
     degree = level.degree
     span = np.clip(np.floor(u), 0, level.point_counts[curve] - degree - 1).astype(np.int64)
     f = np.clip(u - span, 0.0, 1.0)
-    powers = np.zeros((len(f), degree + 1))
-    for p in range(derivative, degree + 1):
-        falling = np.prod(np.arange(p - derivative + 1, p + 1))
-        powers[:, p] = falling * f ** (p - derivative)
-    basis = powers @ basis_matrix(degree).T
+    powers = [np.ones_like(f)]
+    while len(powers) <= degree - derivative:
+        powers.append(powers[-1] * f)
     row = level.offsets()[curve] + span
-    points, weight = np.zeros((len(f), 2)), np.zeros(len(f))
-    for a in range(degree + 1):
-        points += basis[:, a, None] * level.control_points[row + a]
-        weight += level.weights[row + a]
-    return points, weight / (degree + 1)
+    # x + iy, so that one gather serves both coordinates
+    control = level.control_points.astype(np.float64).view(np.complex128)[:, 0]
+    weights = level.weights.astype(np.float64)
+    points, weight = np.zeros(len(f), np.complex128), np.zeros(len(f))
+    for a, coefficients in enumerate(basis_matrix(degree)):
+        basis = np.zeros_like(f)
+        for p in range(derivative, degree + 1):
+            falling = math.perm(p, derivative)
+            basis += falling * coefficients[p] * powers[p - derivative]
+        points += basis * control[row + a]
+        weight += weights[row + a]
+    return points.view(np.float64).reshape(-1, 2), weight / (degree + 1)
 
 
 def sample_level(level: MapLevel, step_m: float) -> LevelSamples:

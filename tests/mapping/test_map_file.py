@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 from bsmap_cli.errors import MapFileError
 from bsmap_cli.mapping.level_codec import QUANTUM_M
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
-from bsmap_cli.mapping.map_file import read_map, write_map
+from bsmap_cli.mapping.map_file import read_map, read_map_with_sizes, write_map
 from tests.mapping.plain_reader import read_bsm
 from tests.maps import line_points, make_level, room_document
 
@@ -151,6 +151,20 @@ def test_raw_payload_is_the_paper_s_accounting():
     at = data.index(b"LEVL")
     (length,) = struct.unpack_from("<I", data, at - 4)
     assert length == 24 + 16 * 2 + 8 * 2 + 9 * (31 + 11)
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_sizes_are_those_of_the_file(compress):
+    stream, document = io.BytesIO(), room_document()
+    sizes = write_map(stream, document, compress=compress)
+    assert sizes.file_bytes == stream.tell()
+    assert sizes.path_bytes == 4 + 12 * 3
+    stream.seek(0)
+    assert read_map_with_sizes(stream)[1] == sizes
+    if not compress:
+        curves, points = len(document.finest), len(document.finest.weights)
+        assert sizes.level_bytes == (24 * curves + 9 * points,)
+    assert write_map(io.BytesIO(), document, with_path=False).path_bytes == 0
 
 
 def test_no_path_leaves_the_path_out():

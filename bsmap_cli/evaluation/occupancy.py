@@ -1,0 +1,132 @@
+"""A map as a grid of occupied, free and unknown cells; free space is what the path has seen."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bsmap_cli.errors import UsageError
+from bsmap_cli.evaluation.visibility import visible_cells
+from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
+from bsmap_cli.mapping.sampling import sample_level
+
+Cells = NDArray[np.uint8]
+
+OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+MARGIN_M = 0.5
+MOST_CELLS = 2**27
+
+
+@dataclass(frozen=True, slots=True)
+class GridFrame:
+    """Where a grid lies: the lower left corner [m], the side of a cell [m], rows and columns.
+
+    Row 0 is the lowest.
+    """
+
+    x_m: float
+    y_m: float
+    resolution_m: float
+    rows: int
+    columns: int
+
+    @property
+    def cells(self) -> int:
+        """How many cells; one byte each in a plain grid."""
+        return self.rows * self.columns
+
+    def in_cells(self, points: Points) -> Points:
+        """(m, 2) column and row of points of the map frame, with fractions."""
+        corner: Points = np.array([self.x_m, self.y_m])
+        return np.asarray((points - corner) / self.resolution_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Occupancy:
+    """cells : (rows, columns) uint8, one of OCCUPIED, UNKNOWN, FREE; row 0 is the lowest."""
+
+    frame: GridFrame
+    cells: Cells
+
+
+def grid_frame(points: Points, resolution_m: float = 0.05) -> GridFrame:
+    """The bounding box of the points, grown by half a metre."""
+    if not len(points):
+        return GridFrame(0.0, 0.0, resolution_m, 0, 0)
+    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+    columns, rows = np.ceil((high - low) / resolution_m - 1e-9).astype(int)
+    return GridFrame(float(low[0]), float(low[1]), resolution_m, int(rows), int(columns))
+
+
+def occupancy(
+    levels: Sequence[MapLevel],
+    path: Points,
+    *,
+    resolution_m: float = 0.05,
+    range_max_m: float = 30.0,
+) -> Occupancy:
+    """Rasterise the drawn curves and fill what is seen from the path.
+
+    path : (m, 2) positions [m], map frame; a free cell lies between one of them and the free side
+    of a curve within `range_max_m`. UsageError where the grid would not fit into memory.
+    """
+    sampled = [sample_level(level, resolution_m / 3) for level in levels]
+    points = np.concatenate([np.zeros((0, 2)), *(samples.points for samples in sampled)])
+    frame = grid_frame(points, resolution_m)
+    if frame.cells > MOST_CELLS:
+        raise UsageError(
+            f"a grid of {frame.columns} x {frame.rows} cells is too large:"
+            f" choose cells larger than {resolution_m:g} m"
+        )
+    cells = np.full((frame.rows, frame.columns), UNKNOWN, np.uint8)
+    facing = np.zeros((frame.rows, frame.columns), np.uint8)
+    for samples in sampled:
+        _mark(facing, frame, samples)
+    if len(path) and frame.cells:
+        views = frame.in_cells(path)
+        cells[visible_cells(facing, views, range_max_m / resolution_m)] = FREE
+    cells[facing != 0] = OCCUPIED
+    return Occupancy(frame, cells)
+
+
+def trinary_png(cells: Cells) -> bytes:
+    """The grid as a greyscale PNG of two bits a pixel, zlib level 9, first row highest.
+
+    Shades are 0 occupied, 1 unknown, 3 free.
+    """
+    rows, columns = cells.shape
+    shades = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
+    shades[:, :columns] = (cells == UNKNOWN) + np.uint8(3) * (cells == FREE)
+    packed = shades.reshape(rows, -1, 4) @ np.array([64, 16, 4, 1], np.uint8)
+    lines = np.zeros((rows, packed.shape[1] + 1), np.uint8)  # filter type 0 before each line
+    lines[:, 1:] = packed[::-1]
+    head = struct.pack(">IIBBBBB", columns, rows, 2, 0, 0, 0, 0)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(lines.tobytes(), 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    )
+
+
+def _mark(facing: Cells, frame: GridFrame, samples: LevelSamples) -> None:
+    """Set, in each cell a curve passes, the octants of sight from which its free side is seen."""
+    place = frame.in_cells(samples.points)
+    limits = [frame.columns - 1, frame.rows - 1]
+    column, row = np.clip(np.floor(place), 0, limits).astype(np.int64).T
+    angle = (np.arange(8) + 0.5) * (np.pi / 4)
+    # a sight line sees the free side, on the left, where it runs against the left normal
+    across = np.outer(samples.tangents[:, 0], np.sin(angle)) - np.outer(
+        samples.tangents[:, 1], np.cos(angle)
+    )
+    octants = np.packbits(across < np.sin(np.pi / 8), axis=1, bitorder="little")[:, 0]
+    np.bitwise_or.at(facing, (row, column), octants)
+    # where a curve steps diagonally one more cell keeps sight lines from slipping through
+    step = np.flatnonzero((np.diff(row) != 0) & (np.diff(column) != 0))
+    step = step[samples.piece[step] == samples.piece[step + 1]]
+    np.bitwise_or.at(facing, (row[step], column[step + 1]), octants[step])
