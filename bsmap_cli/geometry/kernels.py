@@ -128,3 +128,58 @@ def solve_banded(band: Array, rhs: Array) -> bool:
                 value -= band[i, k] * rhs[i + k, c]
             rhs[i, c] = value / band[i, 0]
     return True
+
+
+@njit(cache=True)
+def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:
+    """Eigenvalues (ascending) and eigenvectors (columns) of a symmetric 3 x 3 matrix, by Jacobi."""
+    a = matrix.copy()
+    vectors[:] = 0.0
+    for i in range(3):
+        vectors[i, i] = 1.0
+    for _ in range(8):
+        off = abs(a[0, 1]) + abs(a[0, 2]) + abs(a[1, 2])
+        if off <= 1e-14 * (abs(a[0, 0]) + abs(a[1, 1]) + abs(a[2, 2])):
+            break
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if a[p, q] == 0.0:
+                    continue
+                ratio = (a[q, q] - a[p, p]) / (2.0 * a[p, q])
+                sign = 1.0 if ratio >= 0.0 else -1.0
+                t = sign / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
+                c = 1.0 / math.sqrt(t * t + 1.0)
+                s = t * c
+                for k in range(3):
+                    akp, akq = a[k, p], a[k, q]
+                    a[k, p], a[k, q] = c * akp - s * akq, s * akp + c * akq
+                for k in range(3):
+                    apk, aqk = a[p, k], a[q, k]
+                    a[p, k], a[q, k] = c * apk - s * aqk, s * apk + c * aqk
+                for k in range(3):
+                    vkp, vkq = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = c * vkp - s * vkq, s * vkp + c * vkq
+    for i in range(3):
+        values[i] = a[i, i]
+    for i in range(2):
+        for j in range(2 - i):
+            if values[j] > values[j + 1]:
+                values[j], values[j + 1] = values[j + 1], values[j]
+                for k in range(3):
+                    vectors[k, j], vectors[k, j + 1] = vectors[k, j + 1], vectors[k, j]
+
+
+@njit(cache=True)
+def solve3(matrix: Array, rhs: Array, solution: Array) -> None:
+    """Solve a symmetric positive definite 3 x 3 system by Cholesky."""
+    l00 = math.sqrt(max(matrix[0, 0], 1e-300))
+    l10, l20 = matrix[1, 0] / l00, matrix[2, 0] / l00
+    l11 = math.sqrt(max(matrix[1, 1] - l10 * l10, 1e-300))
+    l21 = (matrix[2, 1] - l20 * l10) / l11
+    l22 = math.sqrt(max(matrix[2, 2] - l20 * l20 - l21 * l21, 1e-300))
+    y0 = rhs[0] / l00
+    y1 = (rhs[1] - l10 * y0) / l11
+    y2 = (rhs[2] - l20 * y0 - l21 * y1) / l22
+    solution[2] = y2 / l22
+    solution[1] = (y1 - l21 * solution[2]) / l11
+    solution[0] = (y0 - l10 * solution[1] - l20 * solution[2]) / l00

@@ -16,6 +16,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.settings import setting
 
 RIDGE = 1e-8  # of the largest diagonal entry: keeps unobserved control points defined
+BEND_PENALTY = 1.0  # of `penalty`, on second differences where data are thin: ends go on straight
 ANCHOR = 1e-4  # of the same, to where a known control point lies
 SNAP = 1e-9  # lattice units: a parameter this close to a knot lies on it
 
@@ -67,6 +68,26 @@ def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
 
 
 @njit(cache=True)
+def fit_rms(
+    u: Vector, points: Points, weights: Vector, matrix: Points, first_span: int, fitted: Points
+) -> float:
+    """Weighted root mean square distance [m] of points from the fit, each at its parameter."""
+    order = matrix.shape[0]
+    basis = np.empty(order)
+    squares = total = 0.0
+    for j in range(len(u)):
+        span = min(max(math.floor(u[j]) - first_span, 0), len(fitted) - order)
+        basis_weights(matrix, u[j] - first_span - span, basis)
+        ex, ey = points[j, 0], points[j, 1]
+        for a in range(order):
+            ex -= basis[a] * fitted[span + a, 0]
+            ey -= basis[a] * fitted[span + a, 1]
+        squares += weights[j] * (ex * ex + ey * ey)
+        total += weights[j]
+    return math.sqrt(squares / max(total, 1e-300))
+
+
+@njit(cache=True)
 def fit_control_points(
     u: Vector,
     points: Points,
@@ -87,13 +108,14 @@ def fit_control_points(
     n = len(solution)
     order = matrix.shape[0]
     band = np.zeros((n, max(order, 4)))
-    basis = np.empty(order)
+    basis, share = np.empty(order), np.zeros(n)
     solution[:] = 0.0
     for j in range(len(u)):
         span = min(max(math.floor(u[j]) - first_span, 0), n - order)
         basis_weights(matrix, u[j] - first_span - span, basis)
         for a in range(order):
             weighted = weights[j] * basis[a]
+            share[span + a] += weighted
             solution[span + a, 0] += weighted * points[j, 0]
             solution[span + a, 1] += weighted * points[j, 1]
             for b in range(a, order):
@@ -119,6 +141,13 @@ def fit_control_points(
             solution[i + a, 1] += penalty * stencil[a] * ty
             for b in range(a, 4):
                 band[i + a, b - a] += penalty * stencil[a] * stencil[b]
+    bend = (1.0, -2.0, 1.0)
+    for i in range(n - 2):
+        weakest = min(share[i], share[i + 1], share[i + 2])
+        pull = BEND_PENALTY * penalty * max(0.0, 1.0 - weakest)
+        for a in range(3):
+            for b in range(a, 3):
+                band[i + a, b - a] += pull * bend[a] * bend[b]
     return solve_banded(band, solution)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.fitting import lattice_domain
 from bsmap_cli.mapping.map_document import TENTATIVE, MapLevel
 
 
@@ -21,8 +20,8 @@ def freeze_level(curve_map: CurveMap, *, max_weight: int, min_seen: int = 1) -> 
         if arrays.count[curve] == 0:
             continue
         start, end = arrays.support[curve]
-        first = math.floor(start) - degree
-        last = max(math.ceil(end), math.floor(start) + 1)
+        low, last = lattice_domain(start, end)
+        first = low - degree
         rows = slice(
             int(arrays.offset[curve] + first - arrays.first[curve]),
             int(arrays.offset[curve] + last - arrays.first[curve]),

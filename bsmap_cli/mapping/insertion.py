@@ -70,6 +70,7 @@ def insert_clusters(
             float(settings.merging.max_weight),
             settings.fitting.penalty,
             settings.fitting.first_penalty,
+            settings.merging.roughest * step,
         )
         if done < count:
             curve_map.reserve(int(curve_map.arrays.sizes[3]))

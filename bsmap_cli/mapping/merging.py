@@ -22,6 +22,7 @@ from bsmap_cli.mapping.fitting import (
     arc_length_parameters,
     chord_length_parameters,
     fit_control_points,
+    fit_rms,
     lattice_domain,
     spacing_weights,
 )
@@ -48,6 +49,11 @@ class MergingSettings:
         symbol="gamma_weight",
         minimum=1,
         maximum=255,
+    )
+    roughest: float = setting(
+        0.25,
+        "points that miss their own curve by more, root mean square, are none [knot steps]",
+        minimum=0.0,
     )
 
 
@@ -145,8 +151,13 @@ def merge_run(
     weights: Vector,
     max_weight: float,
     penalty: float,
-) -> int:
-    """Fit points with known parameters on the lattice of a curve and average the fit into it."""
+    roughest_m: float,
+) -> bool:
+    """Fit points with known parameters on the lattice of a curve and average the fit into it.
+
+    curve : -1 starts a new one. False, and nothing changed, where the fit misses the points by
+    more than `roughest_m`: foliage and clutter are no curves.
+    """
     degree = matrix.shape[0] - 1
     low, high = lattice_domain(np.min(u), np.max(u))
     first, count = low - degree, high - low + degree
@@ -188,7 +199,7 @@ def merge_run(
     if moved:
         offset, count = level.offset[curve], level.count[curve]
     refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
-    return curve
+    return True
 
 
 @njit(cache=True)
@@ -260,6 +271,7 @@ def merge_runs(
     max_weight: float,
     penalty: float,
     first_penalty: float,
+    roughest_m: float,
 ) -> int:
     """Merge the runs from `resume` on; returns the first one that finds no room, or their number."""
     for r in range(resume, len(runs)):
@@ -277,7 +289,7 @@ def merge_runs(
         for j in range(runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]):
             if curves[j] != curve:
                 weights[j - begin] = 0.0
-        merge_run(
+        merged = merge_run(
             level,
             matrix,
             knot_step_m,
@@ -287,5 +299,21 @@ def merge_runs(
             weights,
             max_weight,
             penalty,
+            roughest_m,
         )
+        known_begin, known_end = runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]
+        if not merged and known_begin < known_end and known_end - known_begin < end - begin:
+            known = slice(known_begin - begin, known_end - begin)
+            merge_run(
+                level,
+                matrix,
+                knot_step_m,
+                curve,
+                run_u[known],
+                points[known_begin:known_end],
+                weights[known],
+                max_weight,
+                penalty,
+                roughest_m,
+            )
     return len(runs)

@@ -56,17 +56,24 @@ class Clusters:
     def coarser(self, knot_step_m: float, bin_m: float, sigma_m: float) -> Clusters:
         """The same clusters in wider bins, as a coarser level of the ladder sees them."""
         n = len(self.points)
-        points, counts, tangents = np.empty((n, 2)), np.empty(n), np.empty((n, 2))
-        starts = np.empty_like(self.starts)
+        points, counts, starts = np.empty((n, 2)), np.empty(n), np.empty_like(self.starts)
         bounds = np.stack((self.starts[:-1], self.starts[1:]), axis=1)
         m = _thin(self.points, self.counts, bounds, bin_m, points, counts, starts)
-        _tangents(points, starts, tangent_reach(knot_step_m, sigma_m), tangents)
-        return Clusters(points[:m], tangents[:m], counts[:m], starts)
+        return Clusters.with_tangents(points[:m], counts[:m], starts, knot_step_m, sigma_m)
 
-
-def tangent_reach(knot_step_m: float, sigma_m: float) -> float:
-    """Over what length [m] the direction of a surface is taken: well beyond the noise."""
-    return max(0.5 * knot_step_m, 6.0 * sigma_m)
+    @classmethod
+    def with_tangents(
+        cls,
+        points: Points,
+        counts: Vector,
+        starts: NDArray[np.int64],
+        knot_step_m: float,
+        sigma_m: float,
+    ) -> Clusters:
+        """Add the direction of the surface, taken over a length well beyond the noise."""
+        tangents = np.empty_like(points)
+        _tangents(points, starts, max(0.5 * knot_step_m, 6.0 * sigma_m), tangents)
+        return cls(points, tangents, counts, starts)
 
 
 @njit(cache=True)
@@ -181,8 +188,7 @@ def find_clusters(
         settings.min_length * knot_step_m,
         bounds,
     )
-    points, counts, tangents = np.empty((m, 2)), np.empty(m), np.empty((m, 2))
+    points, counts = np.empty((m, 2)), np.empty(m)
     starts = np.empty(clusters + 1, np.int64)
     n = _thin(returns.points_body, np.ones(m), bounds[:clusters], bin_m, points, counts, starts)
-    _tangents(points, starts, tangent_reach(knot_step_m, sigma_m), tangents)
-    return Clusters(points[:n], tangents[:n], counts[:n], starts)
+    return Clusters.with_tangents(points[:n], counts[:n], starts, knot_step_m, sigma_m)

@@ -1,0 +1,222 @@
+"""Find a scan in a submap without a good guess: branch and bound over translations and angles.
+
+Complete within its window: a block of translations is only left aside when even the best value of
+each point anywhere in the block could not beat what is already found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.slam.likelihood import CHANNELS, Likelihood
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """A pose (3,) in the submap frame and its score in 0..1."""
+
+    pose: Vector
+    score: float
+
+
+@njit(cache=True)
+def _project(
+    points: Points,
+    tangents: Points,
+    angle: float,
+    x: float,
+    y: float,
+    cell_m: float,
+    cells: Integers,
+) -> None:
+    """Cell column, row and channel of each point, turned by `angle` and placed at (x, y)."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    for j in range(len(points)):
+        cells[j, 0] = math.floor((cos * points[j, 0] - sin * points[j, 1] + x) / cell_m)
+        cells[j, 1] = math.floor((sin * points[j, 0] + cos * points[j, 1] + y) / cell_m)
+        tx = cos * tangents[j, 0] - sin * tangents[j, 1]
+        ty = sin * tangents[j, 0] + cos * tangents[j, 1]
+        turn = math.atan2(ty, tx) / (0.5 * math.pi)
+        cells[j, 2] = int(math.floor(turn + 0.5)) % CHANNELS
+
+
+@njit(cache=True)
+def _score(grids: NDArray[np.uint8], height: int, cells: Integers, dx: int, dy: int) -> float:
+    """Mean likelihood of the points shifted by whole cells, or a bound of it above height 0."""
+    _, _, rows, columns = grids.shape
+    total = 0
+    for j in range(len(cells)):
+        c, r = cells[j, 0] + dx, cells[j, 1] + dy
+        if 0 <= c < columns and 0 <= r < rows:
+            total += grids[height, cells[j, 2], r, c]
+    return total / (255.0 * len(cells))
+
+
+@njit(cache=True)
+def _descend(
+    grids: NDArray[np.uint8],
+    cells: Integers,
+    height: int,
+    dx: int,
+    dy: int,
+    best: float,
+    barred: Vector,
+) -> tuple[float, int, int]:
+    """Best translation inside one block of 2^height cells, if it beats `best`.
+
+    barred : dx, dy and radius [cells] of a disc that does not count.
+    """
+    stack = np.empty((4 * (height + 1) + 4, 3), np.int64)
+    bounds = np.empty(len(stack))
+    stack[0, 0], stack[0, 1], stack[0, 2] = height, dx, dy
+    bounds[0] = 2.0
+    depth = 1
+    found_x, found_y = dx, dy
+    found = -1.0
+    children = np.empty((4, 2), np.int64)
+    scores = np.empty(4)
+    while depth > 0:
+        depth -= 1
+        if bounds[depth] <= best:
+            continue
+        h, x, y = stack[depth]
+        if h == 0:
+            if (x - barred[0]) ** 2 + (y - barred[1]) ** 2 < barred[2] ** 2:
+                continue
+            score = _score(grids, 0, cells, x, y)
+            if score > best:
+                best, found, found_x, found_y = score, score, x, y
+            continue
+        half = 1 << (h - 1)
+        for k in range(4):
+            children[k, 0] = x + half * (k & 1)
+            children[k, 1] = y + half * (k >> 1)
+            scores[k] = _score(grids, h - 1, cells, children[k, 0], children[k, 1])
+        for k in np.argsort(scores):  # best child last, so that it is opened first
+            if scores[k] > best:
+                stack[depth, 0] = h - 1
+                stack[depth, 1] = children[k, 0]
+                stack[depth, 2] = children[k, 1]
+                bounds[depth] = scores[k]
+                depth += 1
+    return found, found_x, found_y
+
+
+@njit(cache=True)
+def _search(
+    grids: NDArray[np.uint8],
+    points: Points,
+    tangents: Points,
+    angles: Vector,
+    x: float,
+    y: float,
+    reach: int,
+    cell_m: float,
+    floor: float,
+    barred: Points,
+    results: Points,
+) -> int:
+    """Best score of every angle that beats `floor`: rows of score, angle index, dx, dy."""
+    top = grids.shape[0] - 1
+    block = 1 << top
+    cells = np.empty((len(points), 3), np.int64)
+    blocks = (2 * reach + 1 + block - 1) // block
+    bounds = np.empty(blocks * blocks)
+    count = 0
+    for a in range(len(angles)):
+        _project(points, tangents, angles[a], x, y, cell_m, cells)
+        for k in range(blocks * blocks):
+            bx, by = k % blocks, k // blocks
+            bounds[k] = _score(grids, top, cells, bx * block - reach, by * block - reach)
+        best = floor
+        score, dx, dy = -1.0, 0, 0
+        for k in np.argsort(-bounds):
+            if bounds[k] <= best:
+                break
+            found, fx, fy = _descend(
+                grids,
+                cells,
+                top,
+                (k % blocks) * block - reach,
+                (k // blocks) * block - reach,
+                best,
+                barred[a],
+            )
+            if found > best:
+                best = score = found
+                dx, dy = fx, fy
+        if score > 0.0:
+            results[count, 0] = score
+            results[count, 1] = a
+            results[count, 2] = dx
+            results[count, 3] = dy
+            count += 1
+    return count
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Where to look: `centre` (3,) in the submap frame, half widths [m] and [rad] (pi: all round)."""
+
+    centre: Vector
+    reach_m: float
+    reach_rad: float
+
+
+def search(
+    likelihood: Likelihood,
+    points: Points,
+    tangents: Points,
+    window: Window,
+    *,
+    floor: float,
+    barred: Peak | None = None,
+    apart_m: float = 1.0,
+    apart_rad: float = 0.17,
+) -> Peak | None:
+    """The best pose of a scan in a submap within a window, or None where none scores `floor`.
+
+    Parameters
+    ----------
+    points, tangents : (n, 2) of the scan, body frame; thinned to the cells, they count alike.
+    barred : poses within `apart_m` and `apart_rad` of this peak do not count: what is then found
+        is a rival of it.
+    """
+    if len(points) == 0:
+        return None
+    cell_m, centre = likelihood.cell_m, window.centre
+    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
+    turn = cell_m / max(radius, 4.0 * cell_m)
+    steps = math.ceil(min(window.reach_rad, math.pi) / turn)
+    angles = centre[2] + np.arange(-steps, steps + 1) * turn
+    discs = np.zeros((len(angles), 3))
+    if barred is not None:
+        discs[:, :2] = (barred.pose[:2] - centre[:2]) / cell_m
+        discs[np.abs(angles - barred.pose[2]) < apart_rad, 2] = apart_m / cell_m
+    results = np.empty((len(angles), 4))
+    count = _search(
+        likelihood.grids,
+        points,
+        tangents,
+        angles,
+        centre[0] - likelihood.origin_m[0],
+        centre[1] - likelihood.origin_m[1],
+        math.ceil(window.reach_m / cell_m),
+        cell_m,
+        floor,
+        discs,
+        results,
+    )
+    if count == 0:
+        return None
+    score, angle, dx, dy = results[np.argmax(results[:count, 0])]
+    pose = np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[int(angle)]])
+    return Peak(pose, float(score))

@@ -1,0 +1,87 @@
+"""The map once more, with all poses known: Algorithm 1, then poses and curves in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.settings import setting
+from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.uncertainty import isotropic_information
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FinalMapSettings:
+    """How the finished map is made."""
+
+    rounds: int = setting(
+        2, "times that every keyframe is registered against the whole map", minimum=0
+    )
+    levels: int = setting(2, "levels of the ladder, from the finest up, used for that", minimum=1)
+
+
+def build_map(
+    poses: Points,
+    keyframes: list[Keyframe],
+    ladder: tuple[float, ...],
+    settings: SlamSettings,
+    sigma_m: float,
+) -> list[CurveMap]:
+    """Algorithm 1 over all keyframes; one map for each knot step of `ladder`."""
+    levels = [CurveMap(step, settings.degree) for step in ladder]
+    for pose, keyframe in zip(poses, keyframes, strict=True):
+        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
+        clusters = coarser_levels(finest, ladder, settings.fitting, sigma_m)
+        for level, seen in zip(levels, clusters, strict=True):
+            insert_clusters(level, seen, pose, settings)
+    return levels
+
+
+def refine_poses(
+    poses: Points,
+    levels: list[CurveMap],
+    keyframes: list[Keyframe],
+    settings: SlamSettings,
+    sigma_m: float,
+) -> Points:
+    """Register every keyframe against the whole map, held softly to where the graph put it."""
+    refined = poses.copy()
+    ladder = tuple(level.knot_step_m for level in levels)
+    prior = isotropic_information((0.3 * ladder[-1], 0.02))
+    for k, keyframe in enumerate(keyframes):
+        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
+        clusters = coarser_levels(finest, ladder, settings.fitting, sigma_m)
+        result = register_down(
+            levels,
+            clusters,
+            poses[k],
+            poses[k],
+            prior,
+            sigma_m=sigma_m,
+            settings=settings.registration,
+        )
+        if result.inlier_ratio >= settings.recovery.search_below:
+            refined[k] = result.pose
+    return refined
+
+
+def final_map(
+    poses: Points, keyframes: list[Keyframe], settings: SlamSettings, sigma_m: float
+) -> tuple[Points, list[CurveMap]]:
+    """Refined poses and the levels of the finished map."""
+    ladder = settings.ladder[-settings.final_map.levels :]
+    for _ in range(settings.final_map.rounds):
+        levels = build_map(poses, keyframes, ladder, settings, sigma_m)
+        poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
+    return poses, build_map(poses, keyframes, settings.ladder, settings, sigma_m)

@@ -1,0 +1,75 @@
+"""The scans that change the map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import SE2, Vector
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.settings import setting
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyframeSettings:
+    """When a scan enters the map. Standing still must not saturate the weights."""
+
+    distance: float = setting(2.0, "way since the last keyframe [finest knot steps]", minimum=0.0)
+    angle_deg: float = setting(7.0, "turn since the last keyframe", minimum=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CompactClusters:
+    """`Clusters` of the finest level in float32 and without tangents: what a keyframe keeps."""
+
+    points: NDArray[np.float32]
+    counts: NDArray[np.uint16]
+    starts: NDArray[np.int32]
+
+    @classmethod
+    def pack(cls, clusters: Clusters) -> CompactClusters:
+        """Keep what is needed to insert or match the clusters again."""
+        return cls(
+            clusters.points.astype(np.float32),
+            np.minimum(clusters.counts, 65535).astype(np.uint16),
+            clusters.starts.astype(np.int32),
+        )
+
+    def unpack(self, knot_step_m: float, sigma_m: float) -> Clusters:
+        """The clusters again, with their tangents."""
+        return Clusters.with_tangents(
+            self.points.astype(np.float64),
+            self.counts.astype(np.float64),
+            self.starts.astype(np.int64),
+            knot_step_m,
+            sigma_m,
+        )
+
+
+@dataclass(slots=True)
+class Keyframe:
+    """One scan of the map.
+
+    scan_index : its place in the trajectory. pose_local : (3,) where tracking saw the base, in
+    the drifting local frame. submap : index of the submap it was matched against.
+    information : (3, 3) of that match. weak : tracking had lost the map here.
+    """
+
+    index: int
+    scan_index: int
+    pose_local: SE2
+    clusters: CompactClusters
+    submap: int
+    information: Vector
+    degenerate: bool
+    weak: bool
+
+
+def is_keyframe(step: SE2, settings: KeyframeSettings, finest_step_m: float) -> bool:
+    """Has the base moved or turned enough since the last keyframe?"""
+    return math.hypot(step.x, step.y) > settings.distance * finest_step_m or abs(
+        step.theta
+    ) > math.radians(settings.angle_deg)

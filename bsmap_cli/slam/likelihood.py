@@ -1,0 +1,122 @@
+"""What a submap looks like to a search: how likely a surface of each direction is at each cell.
+
+Four channels hold surfaces running towards east, north, west and south (each within 67.5
+degrees), so that the two sides of a corridor, or of a thin wall, are never taken for one another.
+Above the finest grid stands a pyramid: height h holds, at each cell, the largest value in the
+2^h x 2^h cells towards higher x and y, a bound for a whole block of translations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.mapping.curve_map import CurveMap
+
+Grid = NDArray[np.uint8]
+
+CHANNELS = 4
+REACH_CELLS = 3  # how far round a surface a cell is likely at all
+SPREAD_CELLS = 1.2  # deviation of the likelihood
+
+
+@dataclass(frozen=True, slots=True)
+class Likelihood:
+    """grids : (heights, 4, rows, columns) uint8; origin_m : (2,) corner of cell (0, 0); cell_m."""
+
+    grids: Grid
+    origin_m: NDArray[np.float64]
+    cell_m: float
+
+
+def sample_surfaces(curve_map: CurveMap, spacing_m: float) -> tuple[Points, Points]:
+    """(n, 2) points [m] and (n, 2) directions along all indexed spans of a level."""
+    arrays = curve_map.arrays
+    rows = np.flatnonzero(arrays.span_cell[: arrays.sizes[1]] >= 0)
+    per_span = max(1, math.ceil(curve_map.knot_step_m / spacing_m))
+    points = np.empty((len(rows) * per_span, 2))
+    directions = np.empty_like(points)
+    _sample(arrays.points, rows, curve_map.matrix, per_span, points, directions)
+    return points, directions
+
+
+@njit(cache=True)
+def _sample(
+    control_points: Points,
+    rows: NDArray[np.int64],
+    matrix: Points,
+    per_span: int,
+    points: Points,
+    directions: Points,
+) -> None:
+    polynomial = np.empty((matrix.shape[0], 2))
+    n = 0
+    for row in rows:
+        span_polynomial(control_points, row, matrix, polynomial)
+        for k in range(per_span):
+            x, y, dx, dy, _, _ = polynomial_jet(polynomial, (k + 0.5) / per_span)
+            norm = math.hypot(dx, dy) + 1e-300
+            points[n, 0], points[n, 1] = x, y
+            directions[n, 0], directions[n, 1] = dx / norm, dy / norm
+            n += 1
+
+
+@njit(cache=True)
+def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> None:
+    """Write each surface sample into the channels of its direction; points relative to the grid."""
+    side = 2 * REACH_CELLS + 1
+    for i in range(len(points)):
+        column = math.floor(points[i, 0] / cell_m)
+        row = math.floor(points[i, 1] / cell_m)
+        for channel in range(CHANNELS):
+            angle = channel * math.pi / 2.0
+            along = directions[i, 0] * math.cos(angle) + directions[i, 1] * math.sin(angle)
+            if along < 0.3826834323650898:  # cos 67.5 degrees
+                continue
+            for a in range(side):
+                for b in range(side):
+                    r, c = row + a - REACH_CELLS, column + b - REACH_CELLS
+                    dx = (c + 0.5) * cell_m - points[i, 0]
+                    dy = (r + 0.5) * cell_m - points[i, 1]
+                    squared = (dx * dx + dy * dy) / (SPREAD_CELLS * cell_m) ** 2
+                    value = 255.0 * math.exp(-0.5 * squared)
+                    if value > grid[channel, r, c]:
+                        grid[channel, r, c] = np.uint8(value)
+
+
+@njit(cache=True)
+def _pyramid(grids: Grid) -> None:
+    """Fill heights 1 .. from height 0: the maximum over windows that double in size."""
+    heights, channels, rows, columns = grids.shape
+    for h in range(1, heights):
+        half = 1 << (h - 1)
+        for k in range(channels):
+            for r in range(rows):
+                lower = min(r + half, rows - 1)
+                for c in range(columns):
+                    right = min(c + half, columns - 1)
+                    value = max(grids[h - 1, k, r, c], grids[h - 1, k, r, right])
+                    below = max(grids[h - 1, k, lower, c], grids[h - 1, k, lower, right])
+                    grids[h, k, r, c] = max(value, below)
+
+
+def build_likelihood(curve_map: CurveMap, *, cell_m: float, heights: int) -> Likelihood:
+    """The likelihood pyramid of one level of a submap, in the submap's frame."""
+    points, directions = sample_surfaces(curve_map, 0.5 * cell_m)
+    margin = (REACH_CELLS + 2) * cell_m
+    if len(points) == 0:
+        points, directions = np.zeros((1, 2)), np.array([[1.0, 0.0]])
+    origin = np.floor((points.min(axis=0) - margin) / cell_m) * cell_m
+    # windows towards higher indices look back over the lower edge: pad by the widest one
+    origin = origin - cell_m * (1 << (heights - 1))
+    columns, rows = (np.ceil((points.max(axis=0) + margin - origin) / cell_m) + 1).astype(int)
+    grids = np.zeros((heights, CHANNELS, rows, columns), np.uint8)
+    _stamp(points - origin, directions, cell_m, grids[0])
+    _pyramid(grids)
+    return Likelihood(grids, origin, cell_m)

@@ -1,0 +1,159 @@
+"""Local SLAM: predict, register, recover, insert. Its frame drifts; loop closure mends that."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
+from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.prediction import Prediction, Predictor
+from bsmap_cli.slam.recovery import recover
+from bsmap_cli.slam.registration import RegistrationResult
+from bsmap_cli.slam.submap import Submap
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
+
+FEWEST_POINTS = 10  # a scan with fewer says nothing about being lost
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """What tracking made of one scan: its pose in the local frame, and whether it is a keyframe."""
+
+    pose_local: SE2
+    keyframe: Keyframe | None
+    lost: bool
+    degenerate: bool
+
+
+@dataclass(slots=True)
+class LocalSlam:
+    """Tracks against the older of two active submaps and fills both.
+
+    submaps and keyframes only ever grow; a finished submap no longer changes.
+    """
+
+    settings: SlamSettings
+    sigma_m: float
+    submaps: list[Submap] = field(default_factory=list)
+    keyframes: list[Keyframe] = field(default_factory=list)
+    finished: int = 0
+    _pose: SE2 = field(default_factory=SE2.identity)
+    _lost_scans: int = 0
+    _predictor: Predictor = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._predictor = Predictor(self.settings.prediction, self.settings.ladder[-1])
+
+    @property
+    def last_step(self) -> SE2:
+        """Motion of the base between the last two scans, in its own frame."""
+        return self._predictor.last_step
+
+    def process(
+        self, scan_index: int, clusters: list[Clusters], pose_odom_base: SE2 | None
+    ) -> Tracked:
+        """Predict, register, recover and, on a keyframe, insert."""
+        if not self.submaps:
+            self._begin_submap()
+            self._predictor.observe(SE2.identity(), pose_odom_base)
+            return Tracked(
+                self._pose, self._insert(scan_index, clusters, None, False), False, False
+            )
+        prediction = self._predictor.predict(pose_odom_base)
+        result = self._register(clusters, prediction)
+        told = result.points >= FEWEST_POINTS
+        lost = told and result.inlier_ratio < self.settings.recovery.lost_below
+        pose = self._pose @ prediction.step
+        if not lost and told:
+            pose = self._older.pose_local @ SE2.from_array(result.pose)
+        self._lost_scans = self._lost_scans + 1 if lost else 0
+        self._predictor.observe(self._pose.inverse() @ pose, pose_odom_base)
+        self._pose = pose
+        keyframe = None
+        if self._lost_scans >= self.settings.recovery.patience:
+            self._begin_anew()
+            keyframe = self._insert(scan_index, clusters, None, True)
+            self._lost_scans = 0
+        elif not lost and told:
+            moved = self.keyframes[-1].pose_local.inverse() @ pose
+            if is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1]):
+                keyframe = self._insert(scan_index, clusters, result, False)
+        return Tracked(pose, keyframe, lost, result.degenerate > 0)
+
+    @property
+    def _older(self) -> Submap:
+        return self.submaps[self.finished]
+
+    def _register(self, clusters: list[Clusters], prediction: Prediction) -> RegistrationResult:
+        submap, settings = self._older, self.settings
+        last = submap.to_submap(self._pose)
+        predicted = (last @ prediction.step).as_array()
+        information = prediction.information()
+        result = register_down(
+            submap.levels,
+            clusters,
+            predicted,
+            predicted,
+            information,
+            sigma_m=self.sigma_m,
+            settings=settings.registration,
+        )
+        if result.inlier_ratio >= settings.recovery.search_below or result.points < FEWEST_POINTS:
+            return result
+        reach_m = settings.recovery.reach * settings.ladder[-1]
+        way = math.hypot(prediction.step.x, prediction.step.y)
+        guesses = [(predicted, reach_m + 0.5 * way), (last.as_array(), reach_m + way)]
+        return recover(
+            submap,
+            clusters,
+            guesses,
+            result,
+            information,
+            sigma_m=self.sigma_m,
+            recovery=settings.recovery,
+            registration=settings.registration,
+        )
+
+    def _insert(
+        self,
+        scan_index: int,
+        clusters: list[Clusters],
+        result: RegistrationResult | None,
+        weak: bool,
+    ) -> Keyframe:
+        """Make a keyframe of the last pose, fill the active submaps and turn them over."""
+        keyframe = Keyframe(
+            index=len(self.keyframes),
+            scan_index=scan_index,
+            pose_local=self._pose,
+            clusters=CompactClusters.pack(clusters[-1]),
+            submap=self.finished,
+            information=result.information if result else np.zeros((3, 3)),
+            degenerate=bool(result and result.degenerate),
+            weak=weak,
+        )
+        self.keyframes.append(keyframe)
+        for submap in self.submaps[self.finished :]:
+            submap.insert(keyframe.index, clusters, submap.to_submap(self._pose))
+        full = self.settings.submaps.keyframes
+        if len(self._older.keyframes) >= full and len(self.submaps) > self.finished + 1:
+            self.finished += 1
+        if len(self.submaps[-1].keyframes) >= full // 2 and len(self.submaps) == self.finished + 1:
+            self._begin_submap()
+        return keyframe
+
+    def _begin_submap(self) -> None:
+        self.submaps.append(Submap(len(self.submaps), self._pose, self.settings))
+
+    def _begin_anew(self) -> None:
+        """Leave the active submaps as they are and start on new ground."""
+        self.finished = len(self.submaps)
+        self._begin_submap()

@@ -1,0 +1,220 @@
+"""Loop closure: does this keyframe see a place that an old submap holds?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.settings import setting
+from bsmap_cli.slam.correlative import Window, search
+from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.local_slam import LocalSlam
+from bsmap_cli.slam.recovery import CELL_STEPS
+from bsmap_cli.slam.registration import RegistrationResult
+from bsmap_cli.slam.submap import Submap
+from bsmap_cli.slam.submap_graph import SubmapGraph
+from bsmap_cli.slam.uncertainty import isotropic_information, match_information
+
+HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
+DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSettings:
+    """When a place counts as found again."""
+
+    enabled: bool = setting(True, "look for loops at all")
+    min_inliers: float = setting(
+        0.7, "share of the scan that must lie on the old submap", minimum=0.0, maximum=1.0
+    )
+    max_rms: float = setting(0.5, "of the inliers' residuals [finest knot steps]", minimum=0.0)
+    max_reach: float = setting(200.0, "widest search, half width [finest knot steps]", minimum=0.0)
+    deviations: float = setting(
+        3.0, "a search reaches so many deviations of the graph's uncertainty", minimum=0.0
+    )
+    uniqueness: float = setting(
+        1.1, "the best place must score so many times the best place elsewhere", minimum=1.0
+    )
+    tries: int = setting(2, "most searches for one keyframe", minimum=1)
+    retry: float = setting(
+        10.0, "way before a submap is searched again [finest knot steps]", minimum=0.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """Keyframe seen from a submap: (3,) pose in its frame; information in the same frame."""
+
+    submap: int
+    keyframe: int
+    pose_submap_base: SE2
+    information: Points
+
+
+@dataclass(slots=True)
+class LoopCloser:
+    """Looks for loops, keyframe by keyframe, and tells the submap graph."""
+
+    local: LocalSlam
+    graph: SubmapGraph
+    sigma_m: float
+    loops: list[Loop] = field(default_factory=list)
+    tried: int = 0
+    _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
+    _next_try: dict[int, float] = field(default_factory=dict)
+    _travelled_m: float = 0.0
+
+    def process(self, keyframe: Keyframe) -> None:
+        """Search the nearby old submaps for one keyframe."""
+        if keyframe.index:
+            before = self.local.keyframes[keyframe.index - 1].pose_local
+            step = before.inverse() @ keyframe.pose_local
+            self._travelled_m += math.hypot(step.x, step.y)
+        self.graph.update()
+        candidates = self._candidates(keyframe)
+        if not candidates:
+            return
+        finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.sigma_m)
+        settings = self.local.settings
+        clusters = coarser_levels(finest, settings.ladder, settings.fitting, self.sigma_m)
+        for submap, reach_m, reach_rad in candidates[: settings.loops.tries]:
+            self._try(keyframe, clusters, submap, reach_m, reach_rad)
+
+    def _pose_map(self, keyframe: Keyframe) -> SE2:
+        submap = self.local.submaps[keyframe.submap]
+        return self.graph.poses[submap.index] @ submap.to_submap(keyframe.pose_local)
+
+    def _candidates(self, keyframe: Keyframe) -> list[tuple[Submap, float, float]]:
+        """Finished submaps that may see what the keyframe sees, nearest first."""
+        unit, settings = self.local.settings.ladder[-1], self.local.settings.loops
+        old = [
+            submap
+            for submap in self.local.submaps[: max(0, keyframe.submap - 1)]
+            if submap.keyframes and self._next_try.get(submap.index, 0.0) <= self._travelled_m
+        ]
+        if not old:
+            return []
+        metres, radians = self.graph.deviations_from(keyframe.submap)
+        here = self._pose_map(keyframe)
+        points = keyframe.clusters.points
+        view_m = float(np.median(np.hypot(points[:, 0], points[:, 1]))) if len(points) else 0.0
+        found = []
+        for submap in old:
+            reach_m = settings.deviations * float(metres[submap.index])
+            reach_rad = settings.deviations * float(radians[submap.index])
+            reach_m = min(reach_m, settings.max_reach * unit)
+            local = (self.graph.poses[submap.index].inverse() @ here).as_array()
+            seen = np.array(
+                [
+                    submap.to_submap(self.local.keyframes[k].pose_local).as_array()[:2]
+                    for k in submap.keyframes[::4]
+                ]
+            )
+            distance = float(np.hypot(*(seen - local[:2]).T).min())
+            if distance < view_m + reach_m:
+                found.append((distance / (view_m + reach_m), submap, reach_m, reach_rad))
+        found.sort(key=lambda entry: (entry[0], entry[1].index))
+        return [(submap, reach_m, reach_rad) for _, submap, reach_m, reach_rad in found]
+
+    def _try(
+        self,
+        keyframe: Keyframe,
+        clusters: list[Clusters],
+        submap: Submap,
+        reach_m: float,
+        reach_rad: float,
+    ) -> None:
+        """Search, refine, judge; a closure from far off waits for a second that agrees."""
+        settings = self.local.settings
+        unit = settings.ladder[-1]
+        self.tried += 1
+        self._next_try[submap.index] = self._travelled_m + settings.loops.retry * unit
+        guess = (self.graph.poses[submap.index].inverse() @ self._pose_map(keyframe)).as_array()
+        far = reach_m > DIRECT_STEPS * unit
+        if far:
+            likelihood = submap.likelihood(cell_m=CELL_STEPS * unit, heights=HEIGHTS)
+            coarse = clusters[max(0, len(clusters) - 2)]
+            window = Window(guess, reach_m, reach_rad)
+            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.4)
+            if peak is None:
+                return
+            rival = search(
+                likelihood,
+                coarse.points,
+                coarse.tangents,
+                window,
+                floor=peak.score / settings.loops.uniqueness,
+                barred=peak,
+                apart_m=10.0 * unit,
+            )
+            if rival is not None:
+                return
+            guess = peak.pose
+        deviation = (0.5 * DIRECT_STEPS * unit, 0.1)
+        result = register_down(
+            submap.levels,
+            clusters,
+            guess,
+            guess,
+            isotropic_information(deviation),
+            sigma_m=self.sigma_m,
+            settings=settings.registration,
+        )
+        if not self._good(result, unit):
+            return
+        loop = Loop(
+            submap.index,
+            keyframe.index,
+            SE2.from_array(result.pose),
+            match_information(result.information, unit, frame_rad=0.0),
+        )
+        if reach_m > 10.0 * unit:
+            self._confirm(loop, keyframe)
+        else:
+            self._accept(loop)
+        self._next_try[submap.index] = self._travelled_m + 3.0 * settings.loops.retry * unit
+
+    def _good(self, result: RegistrationResult, unit_m: float) -> bool:
+        settings = self.local.settings.loops
+        return (
+            result.points >= 10
+            and result.inlier_ratio >= settings.min_inliers
+            and result.rms_m <= settings.max_rms * unit_m
+        )
+
+    def _accept(self, loop: Loop) -> None:
+        self.loops.append(loop)
+        keyframe = self.local.keyframes[loop.keyframe]
+        submap = self.local.submaps[keyframe.submap]
+        pose_submap_submap = loop.pose_submap_base @ submap.to_submap(keyframe.pose_local).inverse()
+        self.graph.add_loop(loop.submap, submap.index, pose_submap_submap, loop.information)
+
+    def _confirm(self, loop: Loop, keyframe: Keyframe) -> None:
+        """Two closures agree when both ask for the same correction of the present place."""
+        unit = self.local.settings.ladder[-1]
+        wanted = self.graph.poses[loop.submap] @ loop.pose_submap_base
+        for other, other_wanted in self._doubtful:
+            if other.keyframe == loop.keyframe:
+                continue
+            before = self.local.keyframes[other.keyframe].pose_local
+            tracked = before.inverse() @ keyframe.pose_local
+            asked = other_wanted.inverse() @ wanted
+            gap = tracked.inverse() @ asked
+            way = math.hypot(tracked.x, tracked.y)
+            if (
+                math.hypot(gap.x, gap.y) < 2.0 * unit + 0.05 * way
+                and abs(gap.theta) < math.radians(3.0)
+                and way < 100.0 * unit
+            ):
+                self._doubtful.remove((other, other_wanted))
+                self._accept(other)
+                self._accept(loop)
+                return
+        self._doubtful.append((loop, wanted))
+        del self._doubtful[:-50]

@@ -1,0 +1,80 @@
+"""When tracking slips: search round every place the robot may be, and keep what fits best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.settings import setting
+from bsmap_cli.slam.correlative import Window, search
+from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings
+from bsmap_cli.slam.submap import Submap
+
+HEIGHTS = 4  # of the likelihood pyramid: blocks of 8 cells at the top
+CELL_STEPS = 1.0  # cell of the likelihood [finest knot steps]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoverySettings:
+    """When to search, how far, and when to give up."""
+
+    search_below: float = setting(
+        0.6, "a smaller share of points on the map starts a search", minimum=0.0, maximum=1.0
+    )
+    lost_below: float = setting(
+        0.35,
+        "a smaller share after the search means that tracking is lost",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    gain: float = setting(0.05, "a search result must be better by this share", minimum=0.0)
+    reach: float = setting(
+        4.0, "half width of the search round a guess [finest knot steps]", minimum=0.0
+    )
+    reach_deg: float = setting(35.0, "half width of its angles", minimum=0.0, maximum=180.0)
+    patience: int = setting(
+        3, "scans in a row that must be lost before a new submap is begun", minimum=1
+    )
+
+
+def recover(
+    submap: Submap,
+    clusters: list[Clusters],
+    guesses: list[tuple[Vector, float]],
+    best: RegistrationResult,
+    prior_information: Points,
+    *,
+    sigma_m: float,
+    recovery: RecoverySettings,
+    registration: RegistrationSettings,
+) -> RegistrationResult:
+    """Search round each guess (pose, reach [m]) and refine; `best` stays unless clearly beaten.
+
+    Odometry has jumps of its own and the last pose knows nothing of a gap in the log: both are
+    guesses. What is found is refined without a prior, as the guess it came from may be far off.
+    """
+    cell_m = CELL_STEPS * submap.levels[-1].knot_step_m
+    likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
+    coarse = clusters[max(0, len(clusters) - 2)]
+    for pose, reach_m in guesses:
+        window = Window(pose, reach_m, np.radians(recovery.reach_deg))
+        peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.2)
+        if peak is None:
+            continue
+        loose = prior_information * 1e-4
+        found = register_down(
+            submap.levels,
+            clusters,
+            peak.pose,
+            peak.pose,
+            loose,
+            sigma_m=sigma_m,
+            settings=registration,
+        )
+        if found.inlier_ratio > best.inlier_ratio + recovery.gain:
+            best = found
+    return best

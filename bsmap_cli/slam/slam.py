@@ -1,0 +1,175 @@
+"""From scans to a globally consistent map: Sec. IV, loop closure, and Algorithm 1 at the end."""
+
+from __future__ import annotations
+
+import time
+from array import array
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.freeze import freeze_level
+from bsmap_cli.mapping.map_document import MapDocument
+from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.sensor.gate import estimate_range_sigma, find_returns
+from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.trajectory import Trajectory
+from bsmap_cli.slam.final_map import final_map
+from bsmap_cli.slam.full_graph import solve_full_graph
+from bsmap_cli.slam.local_slam import LocalSlam
+from bsmap_cli.slam.loop_closure import LoopCloser
+from bsmap_cli.slam.slam_settings import SlamSettings
+from bsmap_cli.slam.submap_graph import SubmapGraph
+
+
+@dataclass(frozen=True, slots=True)
+class SlamResult:
+    """The map, one pose for every scan, and how the run went (keys of the report)."""
+
+    document: MapDocument
+    trajectory: Trajectory
+    figures: dict[str, Any]
+
+
+@dataclass(slots=True)
+class ScanLog:
+    """40 bytes a scan: stamp, keyframe before it, pose in the local frame."""
+
+    stamps_ns: array[int] = field(default_factory=lambda: array("q"))
+    keyframes: array[int] = field(default_factory=lambda: array("q"))
+    poses: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, stamp_ns: int, keyframe: int, pose: SE2) -> None:
+        """One scan."""
+        self.stamps_ns.append(stamp_ns)
+        self.keyframes.append(keyframe)
+        self.poses.extend((pose.x, pose.y, pose.theta))
+
+
+class Slam:
+    """Feed scans to `process`, in the order of the log; `finish` closes the map."""
+
+    def __init__(self, settings: SlamSettings) -> None:
+        self.settings = settings
+        self._log = ScanLog()
+        self._local: LocalSlam | None = None
+        self._closer: LoopCloser | None = None
+        self._lost: list[dict[str, int]] = []
+        self._degenerate = 0
+        self._was_lost = False
+        self._last_stamp_ns = 0
+        self.seconds = {"fit": 0.0, "track": 0.0, "loops": 0.0, "graph": 0.0, "final_map": 0.0}
+
+    def process(self, scan: Scan) -> None:
+        """Track one scan, insert it if it is a keyframe, and look for loops."""
+        settings = self.settings
+        started = time.perf_counter()
+        if self._local is None:
+            sigma_m = settings.sensor.range_sigma_m
+            if sigma_m is None:
+                sigma_m = estimate_range_sigma(scan, settings.sensor, settings.ladder[-1])
+            self._local = LocalSlam(settings, sigma_m or 0.1 * settings.ladder[-1])
+            self._closer = LoopCloser(self._local, SubmapGraph(self._local), self._local.sigma_m)
+        local = self._local
+        returns = find_returns(scan, settings.sensor, settings.ladder[-1], self._twist(scan))
+        clusters = scan_levels(
+            returns, settings.ladder, settings.segmentation, settings.fitting, local.sigma_m
+        )
+        segmented = time.perf_counter()
+        index = len(self._log.stamps_ns)
+        tracked = local.process(index, clusters, scan.pose_odom_base)
+        done = time.perf_counter()
+        self.seconds["fit"] += segmented - started
+        self.seconds["track"] += done - segmented
+        self._log.add(scan.stamp_ns, len(local.keyframes) - 1, tracked.pose_local)
+        self._degenerate += tracked.degenerate
+        self._note_loss(tracked.lost, scan.stamp_ns)
+        self._last_stamp_ns = scan.stamp_ns
+        if tracked.keyframe and settings.loops.enabled and self._closer:
+            self._closer.process(tracked.keyframe)
+            self.seconds["loops"] += time.perf_counter() - done
+
+    def _twist(self, scan: Scan) -> np.ndarray | None:
+        """Velocity (vx, vy, omega) of the base, for logs that say when each beam was fired."""
+        elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)
+        sweep = abs(scan.time_increment_s) * len(scan.ranges_m)
+        if self._local is None or not 0.0 < sweep <= 1.5 * elapsed:
+            return None
+        return self._local.last_step.as_array() / elapsed
+
+    def _note_loss(self, lost: bool, stamp_ns: int) -> None:
+        if lost and not self._was_lost:
+            self._lost.append({"stamp_ns": stamp_ns, "scans": 0})
+        if lost:
+            self._lost[-1]["scans"] += 1
+        self._was_lost = lost
+
+    def finish(self) -> SlamResult:
+        """Solve for all poses, build the map once more with them, and give every scan its pose."""
+        local, closer, settings = self._local, self._closer, self.settings
+        if local is None or closer is None:
+            empty = Trajectory(np.zeros(0, np.int64), np.zeros((0, 3)))
+            return SlamResult(
+                MapDocument(degree=settings.degree, max_weight=1, levels=()), empty, {}
+            )
+        started = time.perf_counter()
+        poses, rejected = solve_full_graph(local, closer.loops)
+        solved = time.perf_counter()
+        poses, levels = final_map(poses, local.keyframes, settings, local.sigma_m)
+        self.seconds["graph"] += solved - started
+        self.seconds["final_map"] += time.perf_counter() - solved
+        cap = settings.merging.max_weight
+        document = MapDocument(
+            degree=settings.degree,
+            max_weight=cap,
+            levels=tuple(freeze_level(level, max_weight=cap) for level in levels),
+        )
+        trajectory = self._trajectory(poses)
+        figures = {
+            "keyframes": len(local.keyframes),
+            "submaps": len(local.submaps),
+            "loops": len(closer.loops) - rejected,
+            "loops_tried": closer.tried,
+            "loops_rejected": rejected,
+            "tracking_lost": self._lost,
+            "degenerate_share": self._degenerate / max(len(trajectory), 1),
+            "travelled_m": float(np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T).sum()),
+        }
+        return SlamResult(document, trajectory, figures)
+
+    def _trajectory(self, keyframe_poses: Points) -> Trajectory:
+        """Every scan rides on the keyframes before and behind it, the nearer the more."""
+        local = self._local
+        assert local is not None
+        stamps = np.array(self._log.stamps_ns, np.int64)
+        tracked = np.array(self._log.poses).reshape(-1, 3)
+        before = np.array(self._log.keyframes)
+        after = np.minimum(before + 1, len(local.keyframes) - 1)
+        index = np.array([frame.scan_index for frame in local.keyframes])
+        local_poses = np.array([frame.pose_local.as_array() for frame in local.keyframes])
+        ridden = [
+            compose(keyframe_poses[k], relative(local_poses[k], tracked)) for k in (before, after)
+        ]
+        gap = np.maximum(index[after] - index[before], 1)
+        share = np.clip((np.arange(len(stamps)) - index[before]) / gap, 0.0, 1.0)[:, None]
+        share[after == before] = 0.0
+        step = ridden[1] - ridden[0]
+        step[:, 2] -= np.pi * 2 * np.floor(step[:, 2] / (np.pi * 2) + 0.5)
+        return Trajectory(stamps, ridden[0] + share * step)
+
+
+def relative(origin: Points, poses: Points) -> Points:
+    """(n, 3) poses as seen from (n, 3) origins."""
+    cos, sin = np.cos(origin[:, 2]), np.sin(origin[:, 2])
+    d = poses - origin
+    return np.column_stack((cos * d[:, 0] + sin * d[:, 1], cos * d[:, 1] - sin * d[:, 0], d[:, 2]))
+
+
+def compose(origin: Points, poses: Points) -> Points:
+    """(n, 3) poses given in the frames of (n, 3) origins, in the frame of those."""
+    cos, sin = np.cos(origin[:, 2]), np.sin(origin[:, 2])
+    x = origin[:, 0] + cos * poses[:, 0] - sin * poses[:, 1]
+    y = origin[:, 1] + sin * poses[:, 0] + cos * poses[:, 1]
+    return np.column_stack((x, y, origin[:, 2] + poses[:, 2]))

@@ -1,0 +1,59 @@
+"""A part of the map that is rigid: a stretch of keyframes and the curves they made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.mapping_settings import MappingSettings
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.settings import setting
+from bsmap_cli.slam.likelihood import Likelihood, build_likelihood
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmapSettings:
+    """How much goes into one submap."""
+
+    keyframes: int = setting(
+        40, "a submap is finished after so many; the next one starts at half of them", minimum=4
+    )
+
+
+class Submap:
+    """Curves in the frame of the submap's first keyframe, one map a knot step, coarse to fine.
+
+    pose_local : the submap in the local frame of tracking, which drifts.
+    """
+
+    def __init__(self, index: int, pose_local: SE2, settings: MappingSettings) -> None:
+        self.index = index
+        self.pose_local = pose_local
+        self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
+        self.keyframes: list[int] = []
+        self._settings = settings
+        self._likelihood: tuple[int, Likelihood] | None = None
+
+    def to_submap(self, pose_local: SE2) -> SE2:
+        """A pose of the local frame, in the submap's."""
+        return self.pose_local.inverse() @ pose_local
+
+    def insert(self, keyframe: int, clusters: list[Clusters], pose_submap_base: SE2) -> None:
+        """Let a keyframe change the curves."""
+        pose = pose_submap_base.as_array()
+        for level, seen in zip(self.levels, clusters, strict=True):
+            insert_clusters(level, seen, pose, self._settings)
+        self.keyframes.append(keyframe)
+
+    def likelihood(self, *, cell_m: float, heights: int) -> Likelihood:
+        """What searches look at, for the curves as they stand; kept until they change."""
+        if self._likelihood is None or self._likelihood[0] != len(self.keyframes):
+            built = build_likelihood(self.levels[-1], cell_m=cell_m, heights=heights)
+            self._likelihood = (len(self.keyframes), built)
+        return self._likelihood[1]
+
+    def forget_likelihood(self) -> None:
+        """Give the memory back."""
+        self._likelihood = None

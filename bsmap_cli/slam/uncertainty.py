@@ -1,0 +1,45 @@
+"""How far a relative pose may be off: what edges weigh, and how far a search must look."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points
+
+DRIFT_SHARE = 0.01  # of the way travelled: what registration against a fresh map loses
+DRIFT_RAD_PER_STEP = 0.0001  # turn lost per finest knot step of way
+DEGENERATE_SHARE = 0.10  # of the way where the walls say nothing about it
+WEAK_STEPS, WEAK_RAD = 10.0, 0.35  # a lost stretch: finest knot steps, radians
+FLOOR_STEPS, FLOOR_RAD = 0.2, 0.003  # what no registration goes below
+
+
+def match_information(hessian: Points, knot_step_m: float, *, frame_rad: float) -> Points:
+    """Inverse covariance of a registered pose in its own frame, with a floor under the deviations.
+
+    hessian : (3, 3) of the data in map axes; the data alone are far too sure of themselves, as
+    the errors of map and scan do not average out.
+    """
+    cos, sin = math.cos(frame_rad), math.sin(frame_rad)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    tiny = np.diag([1e-4 / knot_step_m**2, 1e-4 / knot_step_m**2, 1e-2])
+    covariance = np.linalg.inv(turn.T @ hessian @ turn + tiny)
+    floor = np.diag([(FLOOR_STEPS * knot_step_m) ** 2] * 2 + [FLOOR_RAD**2])
+    return np.linalg.inv(covariance + floor)
+
+
+def way_deviation(
+    way_m: float, knot_step_m: float, *, degenerate_m: float = 0.0, weak: bool = False
+) -> tuple[float, float]:
+    """Deviation [m], [rad] that tracking gathers along a way."""
+    metres = FLOOR_STEPS * knot_step_m + DRIFT_SHARE * way_m + DEGENERATE_SHARE * degenerate_m
+    radians = FLOOR_RAD + DRIFT_RAD_PER_STEP * way_m / knot_step_m
+    if weak:
+        metres, radians = metres + WEAK_STEPS * knot_step_m, radians + WEAK_RAD
+    return metres, radians
+
+
+def isotropic_information(deviation: tuple[float, float]) -> Points:
+    """(3, 3) inverse covariance of equal deviation in x and y [m], and of the angle [rad]."""
+    return np.diag([deviation[0] ** -2.0] * 2 + [deviation[1] ** -2.0])
