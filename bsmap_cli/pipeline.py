@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from time import perf_counter
 from typing import Any, Literal, Protocol, TypeVar
 
@@ -21,6 +22,8 @@ from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.sensor.pose_track import PoseTrack
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
+from bsmap_cli.slam.slam import Slam
+from bsmap_cli.slam.slam_settings import SlamSettings
 
 STAGES = ("read", "fit", "register", "merge", "loops", "graph", "final_map", "write")
 Part = TypeVar("Part")
@@ -62,12 +65,14 @@ class Run:
 
 @dataclass(slots=True)
 class _Feed:
-    """Draws the scans of a reader, takes the time it needs, and remembers stamps."""
+    """Draws the scans of a reader, counts them and takes the time that reading needs."""
 
     reader: LogReader
     progress: Progress
     read_s: float = 0.0
-    stamps_ns: list[int] = field(default_factory=list)
+    count: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
 
     def __iter__(self) -> Iterator[Scan]:
         source = iter(self.reader.scans())
@@ -77,16 +82,19 @@ class _Feed:
             self.read_s += perf_counter() - began
             if scan is None:
                 break
-            self.stamps_ns.append(scan.stamp_ns)
+            if not self.count:
+                self.first_ns = scan.stamp_ns
+            self.count += 1
+            self.last_ns = scan.stamp_ns
             yield scan
-            self.progress.scans(len(self.stamps_ns), self.span_s)
-        if not self.stamps_ns:
+            self.progress.scans(self.count, self.span_s)
+        if not self.count:
             raise LogError("the log holds no usable scan: see `bsmap info` for what it holds")
 
     @property
     def span_s(self) -> float:
         """Time from the first scan to the last [s]."""
-        return (self.stamps_ns[-1] - self.stamps_ns[0]) / 1e9
+        return (self.last_ns - self.first_ns) / 1e9
 
 
 def run_map(
@@ -106,8 +114,7 @@ def run_map(
     feed = _Feed(reader, progress or Silent())
     mapper = Mapper(settings_for(MappingSettings, settings))
     pose_of = _pose_source(poses)
-    used_ns: list[int] = []
-    used: list[SE2] = []
+    stamps_ns, poses_used = array("q"), array("d")  # 32 bytes a scan
     insert_s = 0.0
     for scan in feed:
         pose_map_base = pose_of(scan)
@@ -116,19 +123,16 @@ def run_map(
         began = perf_counter()
         mapper.insert(scan, pose_map_base)
         insert_s += perf_counter() - began
-        used_ns.append(scan.stamp_ns)
-        used.append(pose_map_base)
+        stamps_ns.append(scan.stamp_ns)
+        poses_used.extend((pose_map_base.x, pose_map_base.y, pose_map_base.theta))
+    used = len(stamps_ns)
     if not used:
         raise LogError(_no_pose(poses))
     trajectory = Trajectory(
-        np.array(used_ns, np.int64), np.array([pose.as_array() for pose in used])
+        np.frombuffer(stamps_ns, np.int64), np.frombuffer(poses_used).reshape(-1, 3)
     )
-    figures = {
-        "scans_used": len(used),
-        "keyframes": len(used),
-        "stage_seconds": {"merge": insert_s},
-    }
-    without = len(feed.stamps_ns) - len(used)
+    figures = {"scans_used": used, "keyframes": used, "stage_seconds": {"merge": insert_s}}
+    without = feed.count - used
     lost = (f"{without} scans have no pose near their stamp",) if without else ()
     return _finished(feed, settings, mapper.document(), trajectory, figures=figures, losses=lost)
 
@@ -140,8 +144,6 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
     ------
     LogError : the log holds no usable scan.
     """
-    from bsmap_cli.slam.slam import Slam, SlamSettings
-
     progress = progress or Silent()
     feed = _Feed(reader, progress)
     slam = Slam(settings_for(SlamSettings, settings))
@@ -157,9 +159,7 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
     )
 
 
-def completed(
-    run: Run, *, seconds: float, write_s: float, map_report: dict[str, Any]
-) -> dict[str, Any]:
+def completed(run: Run, *, seconds: float, write_s: float) -> dict[str, Any]:
     """The report with what is known once the files are written: `seconds` of the whole command."""
     report = dict(run.report)
     stages = {**report["stage_seconds"], "write": write_s}
@@ -172,7 +172,6 @@ def completed(
         "tracking_scans_per_second": _rate(report["scans"], tracking_s),
         "realtime_factor": _rate(span_s, seconds) if span_s > 0 else None,
         "peak_memory_mb": round(_peak_memory_mb(), 1),
-        "map": map_report,
     }
     return report
 
@@ -198,8 +197,8 @@ def _finished(
     stages = dict.fromkeys(STAGES, 0.0) | figures.pop("stage_seconds", {})
     stages["read"] = feed.read_s
     report = {
-        "scans": len(feed.stamps_ns),
-        "scans_used": len(feed.stamps_ns),
+        "scans": feed.count,
+        "scans_used": feed.count,
         "scans_skipped": read.scans_skipped,
         "keyframes": 0,
         "submaps": 0,

@@ -14,6 +14,7 @@ from bsmap_cli.errors import LogError, MapFileError, UsageError
 
 if TYPE_CHECKING:
     from bsmap_cli.mapping.map_document import MapDocument
+    from bsmap_cli.mapping.map_file import MapSizes
     from bsmap_cli.sensor.trajectory import Trajectory
 
 STDIN = "-"
@@ -78,35 +79,16 @@ def read_trajectory(path: str) -> Trajectory:
         return read_tum(lines)
 
 
-def read_map_file(path: str) -> tuple[MapDocument, int]:
-    """A map and the bytes of its file; MapFileError names the file and the byte at fault."""
-    from bsmap_cli.mapping.map_file import read_map
+def read_map_file(path: str) -> tuple[MapDocument, MapSizes]:
+    """A map and what its parts take in the file; MapFileError names the file and the byte."""
+    from bsmap_cli.mapping.map_file import read_map_with_sizes
 
     with binary_input(path) as stream:
-        counted = _Counted(stream)
         try:
-            document = read_map(io.BufferedReader(counted))
+            return read_map_with_sizes(stream)
         except MapFileError as error:
             name = "standard input" if path == STDIN else path
             raise MapFileError(f"{name}: {error}") from error
-        return document, counted.count
-
-
-class _Counted(io.RawIOBase):
-    """A stream that counts what is read from it: a pipe has no size to ask for."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self.count = 0
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        data = self._stream.read(len(buffer))
-        buffer[: len(data)] = data
-        self.count += len(data)
-        return len(data)
 
 
 def _piped(metavar: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from io import BytesIO, StringIO
+from io import BytesIO
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +21,7 @@ from bsmap_cli.cli.options import (
     TrajectoryOut,
     option,
 )
-from bsmap_cli.cli.outputs import STDOUT, Outputs
+from bsmap_cli.cli.outputs import STDOUT, Outputs, write_trajectory
 from bsmap_cli.cli.report import print_json, size
 from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import UsageError
@@ -77,8 +77,7 @@ class LogFlags:
 def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
     """Run `work` over the log, write what it made and report; the exit code."""
     from bsmap_cli.cli.progress import progress_bar
-    from bsmap_cli.evaluation.map_quality import map_report
-    from bsmap_cli.exchange.tum import write_tum
+    from bsmap_cli.evaluation.map_statistics import map_statistics
     from bsmap_cli.logs.open_log import open_log
     from bsmap_cli.mapping.map_file import write_map
     from bsmap_cli.pipeline import completed
@@ -97,27 +96,28 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         losses = (*reading_losses(reader.report), *run.losses)
         code = exit_code(losses, strict=making.strict, talk=talk)
         write_began = perf_counter()
-        document = with_levels(run.document, making.levels)
-        document = replace(document, meta={**document.meta, "logs": _describe(log.logs)})
+        document = _final_document(run.document, making, log.logs)
         encoded = BytesIO()
-        write_map(encoded, document, compress=making.compress, with_path=not making.no_path)
+        sizes = write_map(encoded, document, compress=making.compress)
         map_out.open().write(encoded.getbuffer())
         if traj_out is not None:
-            text = StringIO()
-            write_tum(text, run.trajectory)
-            traj_out.open().write(text.getvalue().encode())
+            write_trajectory(traj_out.open(), run.trajectory)
     ended = perf_counter()
-    report = completed(
-        run,
-        seconds=ended - began,
-        write_s=ended - write_began,
-        map_report=map_report(document, file_bytes=encoded.tell()),
-    )
+    report = completed(run, seconds=ended - began, write_s=ended - write_began)
     if making.json:
-        print_json(report)
+        print_json({**report, "map": map_statistics(document, sizes).as_json()})
     talk.detail(stage_line(report))
-    talk.note(summary_line(report))
+    talk.note(summary_line(report, sizes.file_bytes))
     return code
+
+
+def _final_document(
+    document: MapDocument, making: MakingFlags, logs: tuple[str, ...]
+) -> MapDocument:
+    """What is written: the wanted levels, the path unless --no-path, and which logs it is of."""
+    chosen = with_levels(document, making.levels)
+    path = chosen.path[:0] if making.no_path else chosen.path
+    return replace(chosen, path=path, meta={**chosen.meta, "logs": _describe(logs)})
 
 
 def with_levels(document: MapDocument, wanted: str) -> MapDocument:
@@ -139,7 +139,7 @@ def with_levels(document: MapDocument, wanted: str) -> MapDocument:
     return replace(document, levels=tuple(chosen))
 
 
-def summary_line(report: dict[str, Any]) -> str:
+def summary_line(report: dict[str, Any], map_bytes: int) -> str:
     """The last line of a run."""
     pace = report["realtime_factor"]
     parts = [
@@ -148,7 +148,7 @@ def summary_line(report: dict[str, Any]) -> str:
         f"{pace:.0f} x real time" if pace is not None else "real time unknown",
         f"{report['scans_skipped']} skipped",
         f"{report['loops']} loops closed",
-        f"map {size(report['map']['file_bytes'])}",
+        f"map {size(map_bytes)}",
     ]
     return ", ".join(parts)
 

@@ -18,7 +18,10 @@ from bsmap_cli.errors import BsmapError, UsageError
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+    from bsmap_cli.sensor.trajectory import Trajectory
+
 STDOUT = "-"
+POSES_A_PIECE = 10_000
 
 
 class Outputs:
@@ -159,6 +162,18 @@ class Output:
                 self._file.close()
         except OSError:  # what could not be written was reported when it was written
             pass
+
+
+def write_trajectory(stream: BinaryIO, trajectory: Trajectory) -> None:
+    """A TUM trajectory, written piece by piece: a long one is never held as text."""
+    from bsmap_cli.exchange.tum import write_tum
+    from bsmap_cli.sensor.trajectory import Trajectory
+
+    for start in range(0, len(trajectory), POSES_A_PIECE):
+        piece = slice(start, start + POSES_A_PIECE)
+        text = io.StringIO()
+        write_tum(text, Trajectory(trajectory.stamps_ns[piece], trajectory.poses[piece]))
+        stream.write(text.getvalue().encode())
 
 
 class _NamedFile(io.FileIO):

@@ -9,7 +9,7 @@ import typer
 
 from bsmap_cli.cli.formats import LOG_FORMATS, chosen_format
 from bsmap_cli.cli.options import Force, TalkFlags, option
-from bsmap_cli.cli.outputs import Outputs
+from bsmap_cli.cli.outputs import Outputs, write_trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,11 +81,8 @@ def run(
     Example:
       bsmap sim wall -o wall.mcap --truth wall.tum --surfaces wall.geojson
     """
-    from io import StringIO
-
     from bsmap_cli.exchange.log_writers import write_log
     from bsmap_cli.exchange.surfaces import surfaces_geojson
-    from bsmap_cli.exchange.tum import write_tum
     from bsmap_cli.sensor.simulator.simulation import simulate
 
     with Outputs(force=force) as outputs:
@@ -101,9 +98,7 @@ def run(
         )
         count = write_log(log.open(), made.scans(), kind)
         if beside[0]:
-            text = StringIO()
-            write_tum(text, made.truth)
-            beside[0].open().write(text.getvalue().encode())
+            write_trajectory(beside[0].open(), made.truth)
         if beside[1]:
             beside[1].open().write(surfaces_geojson(made.world.surfaces()).encode())
     talk.talk().note(f"{count} scans of {made.lidar.beams} beams, seed {made.seed}")
