@@ -38,6 +38,10 @@ class ReadOptions:
 class ReadReport:
     """What happened while reading: filled as the scans are drawn.
 
+    scans_read : scans handed out.
+    scans_skipped : scans, of the chosen topics, that could not be read.
+    truncated : part of the log is missing or damaged.
+    odometry : what moves the base, in a few words.
     warnings : one line each, for the user, without repetition.
     """
 
@@ -46,6 +50,16 @@ class ReadReport:
     truncated: bool = False
     odometry: str = "none"
     warnings: list[str] = field(default_factory=list)
+
+    def warn(self, line: str) -> None:
+        """Tell the user once."""
+        if line not in self.warnings:
+            self.warnings.append(line)
+
+    def lose(self, line: str) -> None:
+        """Tell the user that part of the log is missing or damaged."""
+        self.truncated = True
+        self.warn(line)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

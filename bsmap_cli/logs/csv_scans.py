@@ -1,0 +1,181 @@
+"""CSV, our own plain form: a header row, then a scan a row.
+
+Columns by name, in any order: `stamp_ns` or `t` [s]; `r0,r1,...` [m]. Optional: `x,y,theta`
+(odometry), `angle_min,angle_increment` [rad] (else from the command line),
+`range_min,range_max`, `time_increment`, `laser_x,laser_y,laser_theta` (the laser on the base).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsmap_cli.errors import LogError, UsageError
+from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.canonical import canonical_pose
+from bsmap_cli.logs.messages import BadMessageError, LaserRecord
+from bsmap_cli.logs.reader import ReadOptions, ReadReport
+from bsmap_cli.logs.sources import Source
+from bsmap_cli.logs.text_log import TextScan, lines_of, stamp_ns_of
+
+TOPIC = "csv"
+_RANGE = re.compile(r"r(\d{1,7})")
+_STAMP_LIMIT = 2**63
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    """Where the columns are; `ranges` in beam order, `ranges_last` where they end the row."""
+
+    columns: dict[str, int]
+    ranges: tuple[int, ...]
+    ranges_last: bool
+
+
+class CsvParser:
+    """See `TextParser`."""
+
+    format = "CSV"
+
+    def __init__(self, name: str, sources: Sequence[Source], options: ReadOptions) -> None:
+        if options.topics and options.topics != (TOPIC,):
+            raise UsageError(f"{name} is a CSV log, it has no topics: leave out --topic")
+        self._name = name
+        self._sources = sources
+        self._options = options
+
+    def other_lines(self) -> dict[str, int]:
+        """See `TextParser.other_lines`: there are none."""
+        return {}
+
+    def scans(self, report: ReadReport) -> Iterator[TextScan | BadMessageError]:
+        """See `TextParser.scans`; a part without a header row has that of the part before."""
+        header: _Header | None = None
+        for source in self._sources:
+            is_first = True
+            for number, line in lines_of(source, report):
+                cells = _cells(line)
+                if not cells:
+                    continue
+                if is_first and (names := _names(cells)):
+                    header = self._header(names, source.name)
+                elif header is None:
+                    raise LogError(f"{source.name} has no header row: its columns need names")
+                else:
+                    try:
+                        yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
+                    except (ValueError, BadMessageError) as error:
+                        yield BadMessageError(f"line {number} of {source.name}: {error}")
+                is_first = False
+
+    def _header(self, names: list[str], source: str) -> _Header:
+        columns = {name: index for index, name in enumerate(names)}
+        if "stamp_ns" not in columns and "t" not in columns:
+            raise LogError(f"{source} has no column stamp_ns or t: a scan needs a stamp")
+        beams = sorted(
+            (int(match[1]), index)
+            for index, name in enumerate(names)
+            if (match := _RANGE.fullmatch(name))
+        )
+        ranges = tuple(index for _, index in beams)
+        if [beam for beam, _ in beams] != list(range(len(beams))) or len(beams) < 2:
+            raise LogError(f"{source} has no columns r0, r1, ... without a hole: a scan needs them")
+        options = self._options
+        for column, flag, given in (
+            ("angle_min", "--angle-min", options.angle_min_rad),
+            ("angle_increment", "--angle-increment", options.angle_increment_rad),
+        ):
+            if column not in columns and given is None:
+                raise UsageError(f"{source} has no column {column}: give {flag}")
+        ranges_last = ranges == tuple(range(len(names) - len(ranges), len(names)))
+        return _Header(columns, ranges, ranges_last)
+
+    def _scan(self, cells: list[bytes], header: _Header, *, is_whole: bool) -> TextScan:
+        if not is_whole and len(cells) < len(header.columns):
+            raise BadMessageError("the last line is cut off")
+        if header.ranges_last:
+            texts = cells[header.ranges[0] :]
+        else:
+            texts = [cells[index] for index in header.ranges if index < len(cells)]
+        fields = _Fields(cells, header.columns)
+        options = self._options
+        record = LaserRecord(
+            fields.stamp_ns(),
+            "",
+            fields.number("angle_min", options.angle_min_rad),
+            fields.number("angle_increment", options.angle_increment_rad),
+            fields.number("time_increment", 0.0),
+            fields.number("range_min", 0.0),
+            fields.number("range_max", math.inf),
+            _ranges(texts),
+        )
+        return TextScan(
+            TOPIC,
+            record,
+            fields.pose("x", "y", "theta"),
+            fields.pose("laser_x", "laser_y", "laser_theta"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Fields:
+    """The cells of one row by the names of their columns."""
+
+    cells: list[bytes]
+    columns: dict[str, int]
+
+    def stamp_ns(self) -> int:
+        if "stamp_ns" not in self.columns:
+            return stamp_ns_of(self._cell("t"))
+        stamp_ns = int(self._cell("stamp_ns"))
+        if abs(stamp_ns) >= _STAMP_LIMIT:
+            raise BadMessageError("a stamp beyond 64 bits")
+        return stamp_ns
+
+    def number(self, name: str, otherwise: float | None) -> float:
+        text = self._cell(name)
+        if text:
+            return float(text)
+        return math.nan if otherwise is None else otherwise
+
+    def pose(self, x: str, y: str, theta: str) -> SE2 | None:
+        numbers = [self.number(name, None) for name in (x, y, theta)]
+        return canonical_pose(*numbers) if all(map(math.isfinite, numbers)) else None
+
+    def _cell(self, name: str) -> bytes:
+        index = self.columns.get(name, len(self.cells))
+        return self.cells[index] if index < len(self.cells) else b""
+
+
+def _cells(line: bytes) -> list[bytes]:
+    """The cells of a row; none for an empty line or a comment."""
+    text = line.partition(b"#")[0].replace(b'"', b"").strip().removeprefix(b"\xef\xbb\xbf")
+    return text.split(b",") if text else []
+
+
+def _names(cells: list[bytes]) -> list[str] | None:
+    """Column names, or None for a row of numbers."""
+    first = cells[0].strip()
+    try:
+        float(first or b"0")
+    except ValueError:
+        return [cell.strip().decode("utf-8", "replace").lower() for cell in cells]
+    return None
+
+
+def _ranges(texts: list[bytes]) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
+    try:
+        numbers = list(map(float, texts))
+    except ValueError:
+        numbers = [float(text) if text.strip() else math.nan for text in texts]
+    return np.array(numbers, dtype=np.float64).astype(np.float32)
+
+
+def is_header(line: bytes) -> bool:
+    """Whether a line of text names the columns of a log of scans."""
+    names = _names(_cells(line) or [b"0"]) or []
+    return any(name in ("t", "stamp_ns") or _RANGE.fullmatch(name) for name in names)

@@ -1,0 +1,126 @@
+"""A log of messages, in one file or several: MCAP, ROS 1 bag, ROS 2 bag."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from itertools import chain
+
+from bsmap_cli.logs.decoding import Decoder, Kind, decoder_for, kind_of
+from bsmap_cli.logs.message_info import LogSurvey, indexed_channels
+from bsmap_cli.logs.messages import BadMessageError, Channel, Container, RawMessage
+from bsmap_cli.logs.mountings import Mountings
+from bsmap_cli.logs.preview import Event, Preview
+from bsmap_cli.logs.reader import LogInfo, LogReader, ReadOptions, ReadReport
+from bsmap_cli.logs.scan_stream import ScanStream
+from bsmap_cli.sensor.scan import Scan
+
+
+class MessageLog:
+    """Streams the scans of containers that are the parts of one run; see `LogReader`."""
+
+    def __init__(self, name: str, containers: list[Container], options: ReadOptions) -> None:
+        self.report = ReadReport()
+        self._containers = containers
+        self._options = options
+        self._preview = Preview(name, options)
+        self._decoders: dict[Channel, tuple[Kind, Decoder]] = {}
+        self._needed: frozenset[str | None] | None = None
+        self._drawn: Generator[Scan, None, None] | None = None
+
+    def __enter__(self) -> LogReader:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if self._drawn is not None:
+            self._drawn.close()
+
+    def scans(self) -> Iterator[Scan]:
+        """See `LogReader.scans`."""
+        self._drawn = self._scans()
+        return self._drawn
+
+    def info(self) -> LogInfo:
+        """See `LogReader.info`; with an index only the first seconds are read."""
+        survey = LogSurvey(self._preview, self._containers)
+        is_judged = survey.is_indexed and not survey.has_scans
+        with closing(self._raw(wants_all=True)) as messages:
+            for channel, log_time_ns, payload in messages:
+                if is_judged and survey.is_indexed:
+                    break
+                survey.count(channel, log_time_ns)
+                if not is_judged and channel in self._decoders:
+                    is_judged = self._preview.add(self._decoded(channel, log_time_ns, payload))
+        return survey.info()
+
+    def _scans(self) -> Generator[Scan, None, None]:
+        preview = self._preview
+        preview.indexed = indexed_channels(self._containers)
+        with closing(self._events()) as events:
+            for event in events:
+                if preview.add(event):
+                    break
+            stream = self._stream()
+            yield from stream.scans(chain(_emptied(preview.events), events))
+
+    def _stream(self) -> ScanStream:
+        preview, report = self._preview, self.report
+        topics = preview.scan_topics(report)
+        motion = preview.motion(topics, report)
+        mountings = Mountings(preview.tree, preview.base_frame(motion), self._options, report)
+        frozen = preview.frozen_topics(topics)
+        self._keep_only(frozenset((*topics, motion.topic)))
+        return ScanStream(
+            topics=topics,
+            frozen=frozen,
+            motion=motion,
+            mountings=mountings,
+            options=self._options,
+            report=report,
+        )
+
+    def _keep_only(self, topics: frozenset[str | None]) -> None:
+        """Stop decoding what was not chosen; None among the topics stands for transforms."""
+        self._needed = topics
+        self._decoders = {
+            channel: (kind, decoder)
+            for channel, (kind, decoder) in self._decoders.items()
+            if self._is_needed(channel, kind)
+        }
+
+    def _is_needed(self, channel: Channel, kind: Kind) -> bool:
+        if self._needed is None:
+            return True
+        return (None if kind is Kind.TRANSFORMS else channel.topic) in self._needed
+
+    def _events(self) -> Generator[Event, None, None]:
+        with closing(self._raw(wants_all=False)) as messages:
+            for channel, log_time_ns, payload in messages:
+                if channel in self._decoders:
+                    yield self._decoded(channel, log_time_ns, payload)
+
+    def _decoded(self, channel: Channel, log_time_ns: int, payload: bytes | memoryview) -> Event:
+        kind, decode = self._decoders[channel]
+        try:
+            return Event(channel, kind, log_time_ns, decode(payload))
+        except BadMessageError as error:
+            return Event(channel, kind, log_time_ns, error)
+
+    def _raw(self, *, wants_all: bool) -> Generator[RawMessage, None, None]:
+        def wants(channel: Channel) -> bool:
+            self._preview.declared.setdefault(channel.topic, channel)
+            kind = kind_of(channel)
+            if kind is not None and self._is_needed(channel, kind):
+                decoder = decoder_for(channel, last_echo=self._options.last_echo)
+                self._decoders[channel] = kind, decoder
+            return wants_all or channel in self._decoders
+
+        for container in self._containers:
+            yield from container.messages(wants, self.report)
+
+
+def _emptied(events: list[Event]) -> Iterator[Event]:
+    """The events in their order, each forgotten as it is drawn."""
+    events.reverse()
+    while events:
+        yield events.pop()

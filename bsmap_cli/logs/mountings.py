@@ -1,0 +1,79 @@
+"""Where each laser of a log sits on the base, and what is said where the log does not tell."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bsmap_cli.logs.reader import ReadOptions, ReadReport
+from bsmap_cli.logs.transforms import (
+    Matrix,
+    Mounting,
+    TransformTree,
+    is_base,
+    is_world,
+    matrix_of,
+    mounting_of,
+)
+
+
+class Mountings:
+    """Finds the mounting of a laser by its frame: the option, the tree of frames, or the base.
+
+    base_frame : where known; else the likely base above the laser.
+    """
+
+    def __init__(
+        self,
+        tree: TransformTree,
+        base_frame: str | None,
+        options: ReadOptions,
+        report: ReadReport,
+    ) -> None:
+        self._tree = tree
+        self._base_frame = base_frame
+        self._options = options
+        self._report = report
+
+    def of(self, frame: str, pose_frame_laser: tuple[float, ...] | None = None) -> Mounting:
+        """The mounting of the laser with this frame; see `LaserRecord.pose_frame_laser`."""
+        if self._options.pose_base_laser is not None:
+            return Mounting(self._options.pose_base_laser, self._options.laser_flipped)
+        inner = None
+        if pose_frame_laser is not None and not is_world(frame):
+            inner = matrix_of(pose_frame_laser[:3], pose_frame_laser[3:])
+        outer = self._outer(frame, is_posed=inner is not None and not _is_identity(inner))
+        mounting = mounting_of(outer if inner is None else outer @ inner)
+        if mounting.is_tilted:
+            self._report.warn(
+                f"{frame} is tilted by {math.degrees(mounting.tilt_rad):.0f} degrees: its scans"
+                " are taken as if they were level"
+            )
+        return mounting
+
+    def _outer(self, frame: str, *, is_posed: bool) -> Matrix:
+        base = self._base_frame
+        if base is None:
+            base = frame if is_base(frame) else self._tree.likely_base(frame)
+        matrix = None if base is None else self._tree.matrix(base, frame)
+        if base is None or matrix is None:
+            if not is_posed:
+                self._report.warn(_taken_as_base(frame, base))
+            return np.eye(4)
+        if self._tree.moves(base, frame):
+            self._report.warn(f"{frame} moves on {base}: its first place is used for the whole log")
+        return matrix
+
+
+def _is_identity(matrix: Matrix) -> bool:
+    return bool(np.allclose(matrix, np.eye(4), rtol=0.0, atol=1e-9))
+
+
+def _taken_as_base(frame: str, base: str | None) -> str:
+    missing = f" from {base}" if base else ""
+    laser = f" {frame}" if frame else ""
+    return (
+        f"no transform{missing} to the laser{laser} in the log: the laser is taken to be the base"
+        " (tell its place with --laser-pose x,y,yaw_deg)"
+    )

@@ -1,0 +1,123 @@
+"""The sqlite3 files of ROS 2 bags (`.db3`), also alone, also cut."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+from bsmap_cli.logs.byte_streams import ZSTD_MAGIC, DamagedBytesError
+from bsmap_cli.logs.chunks import CHUNK_LIMIT_BYTES, unpack_chunk
+from bsmap_cli.logs.messages import Channel, ContainerIndex, RawMessage, normal_type
+from bsmap_cli.logs.reader import ReadReport
+from bsmap_cli.logs.sources import Source
+
+MAGIC = b"SQLite format 3\0"
+_COUNTS = (
+    "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY topic_id"
+)
+
+
+class SqliteContainer:
+    """One sqlite3 file of a ROS 2 bag; a stream is copied to a temporary file first."""
+
+    format = "ROS 2 bag (sqlite3)"
+
+    def __init__(self, source: Source) -> None:
+        self.name = source.name
+        self._source = source
+
+    def index(self) -> ContainerIndex | None:
+        """Counted by the database; None for a stream or a damaged file."""
+        if self._source.plain_path is None:
+            return None
+        try:
+            with self._connect() as database:
+                channels = _channels(database)
+                rows = list(database.execute(_COUNTS))
+        except (sqlite3.Error, DamagedBytesError):
+            return None  # damage is told when the messages are read
+        counts = {topic: count for topic, count, _, _ in rows}
+        return ContainerIndex(
+            counts={channel: counts.get(topic, 0) for topic, channel in channels.items()},
+            start_ns=min((start for _, _, start, _ in rows), default=0),
+            end_ns=max((end for _, _, _, end in rows), default=0),
+        )
+
+    def messages(
+        self, wants: Callable[[Channel], bool], report: ReadReport
+    ) -> Iterator[RawMessage]:
+        """See `Container`; the order is that of writing, not that of the stamps."""
+        try:
+            with self._connect() as database:
+                channels = _channels(database)
+                wanted = {key: channel for key, channel in channels.items() if wants(channel)}
+                marks = ",".join("?" * len(wanted))
+                rows = database.execute(
+                    "SELECT topic_id, timestamp, data FROM messages"
+                    f" WHERE topic_id IN ({marks}) ORDER BY rowid",
+                    tuple(wanted),
+                )
+                for topic, log_time_ns, data in rows:
+                    if isinstance(data, bytes) and isinstance(log_time_ns, int):
+                        yield wanted[topic], log_time_ns, _unpacked(data)
+        except (sqlite3.Error, DamagedBytesError) as error:
+            report.lose(f"{self.name}: {error}; what comes before is used")
+
+    @contextmanager
+    def _connect(self) -> Iterator[sqlite3.Connection]:
+        with ExitStack() as stack:
+            path = self._source.plain_path
+            if path is None:
+                path = stack.enter_context(_copied(self._source))
+            yield stack.enter_context(closing(_open_database(path)))
+
+
+@contextmanager
+def _copied(source: Source) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder, source.open() as packed:
+        copy = Path(folder) / "log.db3"
+        with copy.open("wb") as file:
+            shutil.copyfileobj(packed, file, 1 << 20)
+        yield copy
+
+
+def _open_database(path: Path) -> sqlite3.Connection:
+    """Read only; a journal that a crashed recorder left behind is read along."""
+    journal = path.with_name(path.name + "-wal")
+    mode = "mode=ro" if journal.exists() and journal.stat().st_size else "immutable=1"
+    database = sqlite3.connect(f"file:{quote(str(path.absolute()))}?{mode}", uri=True)
+    database.execute("PRAGMA writable_schema = ON")  # else sqlite refuses a cut file outright
+    return database
+
+
+def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
+    try:
+        rows = database.execute(
+            "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        )
+        definitions = {str(name): (str(kind), str(text)) for name, kind, text in rows}
+    except sqlite3.Error:
+        definitions = {}  # bags older than Iron carry none
+    channels = {}
+    topics = database.execute("SELECT id, name, type, serialization_format FROM topics")
+    for key, topic, type_name, encoding in topics:
+        kind, text = definitions.get(str(type_name), ("", ""))
+        channels[key] = Channel(
+            topic=str(topic),
+            type=normal_type(str(type_name)),
+            encoding=str(encoding),
+            schema_encoding=kind,
+            schema=text.encode("utf-8", "replace"),
+        )
+    return channels
+
+
+def _unpacked(data: bytes) -> bytes:
+    if not data.startswith(ZSTD_MAGIC):  # no CDR message starts like this
+        return data
+    return unpack_chunk(data, "zstd", CHUNK_LIMIT_BYTES, is_cut=False)

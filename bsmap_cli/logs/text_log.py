@@ -1,0 +1,190 @@
+"""Logs of text lines, a scan a line, with the pose of the robot beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from decimal import Decimal, InvalidOperation
+from typing import NamedTuple, Protocol
+
+from bsmap_cli.errors import UsageError
+from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.byte_streams import DamagedBytesError
+from bsmap_cli.logs.laser import scan_of
+from bsmap_cli.logs.messages import SECOND_NS, BadMessageError, LaserRecord
+from bsmap_cli.logs.reader import LogInfo, LogReader, ReadOptions, ReadReport, TopicInfo
+from bsmap_cli.logs.sources import Source
+from bsmap_cli.logs.window import ScanWindow, Verdict
+from bsmap_cli.sensor.scan import Scan
+
+LINE_LIMIT_BYTES = 1 << 24
+_STAMP_LIMIT = Decimal(2**63) / SECOND_NS
+
+
+class TextScan(NamedTuple):
+    """One line that holds a scan; `pose_base_laser` is None where the log does not tell it."""
+
+    topic: str
+    record: LaserRecord
+    pose_odom_base: SE2 | None
+    pose_base_laser: SE2 | None
+
+
+class TextParser(Protocol):
+    """One format of text lines."""
+
+    format: str
+
+    def scans(self, report: ReadReport) -> Iterator[TextScan | BadMessageError]:
+        """The scans of all sources in the order of the lines; what is wrong with bad lines."""
+        ...
+
+    def other_lines(self) -> dict[str, int]:
+        """How many lines of other known kinds were passed over, by kind."""
+        ...
+
+
+class TextLog:
+    """Streams the scans of a parser; see `LogReader`."""
+
+    def __init__(self, name: str, parser: TextParser, options: ReadOptions) -> None:
+        if options.odom not in ("auto", "none"):
+            raise UsageError(
+                f"{name} is a {parser.format} log, its poses stand beside its scans:"
+                " --odom is auto or none"
+            )
+        self.report = ReadReport()
+        self._name = name
+        self._parser = parser
+        self._options = options
+        self._drawn: Generator[Scan, None, None] | None = None
+
+    def __enter__(self) -> LogReader:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if self._drawn is not None:
+            self._drawn.close()
+
+    def scans(self) -> Iterator[Scan]:
+        """See `LogReader.scans`."""
+        self._drawn = self._scans()
+        return self._drawn
+
+    def _scans(self) -> Generator[Scan, None, None]:
+        window = ScanWindow(self._options)
+        for line in self._parser.scans(self.report):
+            if isinstance(line, BadMessageError):
+                self._skip(line)
+                continue
+            verdict = window.judge(line.record.stamp_ns, line.topic)
+            if verdict is Verdict.STOP:
+                return
+            if verdict is Verdict.SKIP:
+                continue
+            try:
+                scan = self._scan(line)
+            except BadMessageError as error:
+                self._skip(error)
+                continue
+            self.report.scans_read += 1
+            yield scan
+
+    def info(self) -> LogInfo:
+        """See `LogReader.info`; the log is read through."""
+        counts: dict[str, int] = {}
+        beams, low_ns, high_ns, odometry = 0, 0, 0, "none"
+        for line in self._parser.scans(self.report):
+            if isinstance(line, BadMessageError):
+                self._skip(line)
+                continue
+            stamp_ns = line.record.stamp_ns
+            low_ns, high_ns = (
+                (min(low_ns, stamp_ns), max(high_ns, stamp_ns))
+                if counts
+                else (
+                    stamp_ns,
+                    stamp_ns,
+                )
+            )
+            counts[line.topic] = counts.get(line.topic, 0) + 1
+            beams = beams or len(line.record.ranges_m)
+            if line.pose_odom_base is not None and self._options.odom != "none":
+                odometry = _POSES
+        duration_s = (high_ns - low_ns) / SECOND_NS
+        topics = [(topic, count, True) for topic, count in counts.items()]
+        topics += [(kind, count, False) for kind, count in self._parser.other_lines().items()]
+        return LogInfo(
+            format=self._parser.format,
+            duration_s=duration_s,
+            topics=tuple(
+                TopicInfo(
+                    topic=topic,
+                    type=f"{self._parser.format} {'scan' if usable else 'line'}",
+                    messages=count,
+                    rate_hz=(count - 1) / duration_s if duration_s > 0.0 and count > 1 else 0.0,
+                    frame="",
+                    usable=usable,
+                )
+                for topic, count, usable in sorted(topics)
+            ),
+            selected=tuple(sorted(counts)),
+            beams=beams,
+            odometry=odometry,
+        )
+
+    def _scan(self, line: TextScan) -> Scan:
+        options = self._options
+        pose_base_laser = options.pose_base_laser or line.pose_base_laser
+        if pose_base_laser is None:
+            self.report.warn(
+                "the log does not tell where the laser sits: it is taken to be the base"
+                " (tell its place with --laser-pose x,y,yaw_deg)"
+            )
+            pose_base_laser = SE2.identity()
+        pose_odom_base = line.pose_odom_base if options.odom == "auto" else None
+        if pose_odom_base is not None:
+            self.report.odometry = _POSES
+        return scan_of(
+            line.record,
+            stamp_ns=line.record.stamp_ns,
+            topic=line.topic,
+            pose_base_laser=pose_base_laser,
+            upside_down=options.laser_flipped,
+            pose_odom_base=pose_odom_base,
+        )
+
+    def _skip(self, error: BadMessageError) -> None:
+        self.report.scans_skipped += 1
+        if self.report.scans_skipped == 1:
+            self.report.warn(f"lines of {self._name} are skipped, the first because: {error}")
+
+
+_POSES = "poses in the log"
+
+
+def lines_of(source: Source, report: ReadReport) -> Iterator[tuple[int, bytes]]:
+    """Line number and line, with its end; damage and a cut last line are told to `report`."""
+    number = 0
+    with source.open() as stream:
+        try:
+            while line := stream.readline(LINE_LIMIT_BYTES):
+                number += 1
+                yield number, line
+                while len(line) == LINE_LIMIT_BYTES and not line.endswith(b"\n"):
+                    line = stream.readline(LINE_LIMIT_BYTES)  # the rest of an endless line
+        except DamagedBytesError as error:
+            report.lose(f"{source.name}: {error}; what comes before is used")
+
+
+def stamp_ns_of(text: bytes) -> int:
+    """Decimal seconds to nanoseconds, exactly; raises BadMessageError for other text."""
+    whole, _, fraction = text.partition(b".")
+    if whole.isdigit() and fraction.isdigit() and len(whole) <= 10 and len(fraction) <= 9:
+        return int(whole) * SECOND_NS + int(fraction.ljust(9, b"0"))
+    try:
+        seconds = Decimal(text.decode("ascii"))
+        if seconds.is_finite() and abs(seconds) < _STAMP_LIMIT:
+            return int((seconds * SECOND_NS).to_integral_value())
+    except (InvalidOperation, UnicodeDecodeError):
+        pass
+    raise BadMessageError("a stamp that is no number of seconds")
