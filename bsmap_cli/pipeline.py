@@ -10,11 +10,12 @@ from time import perf_counter
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bsmap_cli import __version__
 from bsmap_cli.config import Settings, settings_as_dict
 from bsmap_cli.errors import LogError
-from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.geometry.se2 import SE2, wrap_angle
 from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
@@ -151,7 +152,7 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
         slam.process(scan)
     progress.stage("closing loops and building the final map")
     result = slam.finish()
-    figures = dict(result.figures)
+    figures = {**result.figures, "stage_seconds": _stages(slam.seconds)}
     lost = figures.get("tracking_lost") or ()
     losses = (f"tracking was lost and started again {len(lost)} times",) if lost else ()
     return _finished(
@@ -180,6 +181,20 @@ def settings_for(kind: type[Part], settings: Settings) -> Part:
     """The part of the settings that one algorithm declares, field by field."""
     names = (entry.name for entry in fields(kind))  # type: ignore[arg-type]
     return kind(**{name: getattr(settings, name) for name in names})
+
+
+def thinned_path(
+    trajectory: Trajectory, *, step_m: float = 1.0, turn_rad: float = np.pi / 4
+) -> NDArray[np.float32]:
+    """(M, 3) float32: the first pose, and each one `step_m` or `turn_rad` from the last kept."""
+    kept: list[Any] = []
+    for pose in trajectory.poses:
+        if kept:
+            x, y, turn = pose - kept[-1]
+            if np.hypot(x, y) < step_m and abs(wrap_angle(float(turn))) < turn_rad:
+                continue
+        kept.append(pose)
+    return np.array(kept, np.float32).reshape(-1, 3)
 
 
 def _finished(
@@ -224,7 +239,7 @@ def _finished(
         **document.meta,
     }
     return Run(
-        document=replace(document, meta=meta),
+        document=replace(document, meta=meta, path=thinned_path(trajectory)),
         trajectory=trajectory,
         report=report,
         losses=losses,
@@ -236,6 +251,12 @@ def _pose_source(poses: Trajectory | Literal["odom"]) -> Callable[[Scan], SE2 | 
         track = PoseTrack(poses)
         return lambda scan: track.at(scan.stamp_ns)
     return lambda scan: scan.pose_odom_base
+
+
+def _stages(seconds: dict[str, float]) -> dict[str, float]:
+    """Seconds by the names of the report: tracking is registration and what it inserts."""
+    named = dict(seconds)
+    return {"register": named.pop("track", 0.0), **named}
 
 
 def _no_pose(poses: Trajectory | Literal["odom"]) -> str:

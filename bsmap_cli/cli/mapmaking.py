@@ -90,8 +90,13 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         traj_out = outputs.add(making.traj) if making.traj is not None else None
         settings = log.settings.settings(log.sensor.overrides())
         options = log.read.options()
-        with open_log(log.logs, options) as reader, progress_bar(talk, options.max_scans) as bar:
-            run = work(reader, settings, bar)
+        with open_log(log.logs, options) as reader:
+
+            def started() -> None:
+                talk.note(f"odometry: {reader.report.odometry}")
+
+            with progress_bar(talk, started=started, total=options.max_scans) as bar:
+                run = work(reader, settings, bar)
         tell_warnings(reader.report, talk)
         losses = (*reading_losses(reader.report), *run.losses)
         code = exit_code(losses, strict=making.strict, talk=talk)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -21,10 +21,15 @@ SLOW_START_S = 3.0
 
 
 @contextmanager
-def progress_bar(talk: Talk, total: int | None = None) -> Iterator[Silent]:
-    """A bar for the length of the block; silent with --quiet and where nobody looks."""
+def progress_bar(
+    talk: Talk, *, started: Callable[[], None], total: int | None = None
+) -> Iterator[Silent]:
+    """A bar for the length of the block; silent with --quiet and where nobody looks.
+
+    started : called once, when the first scan is through.
+    """
     if talk.level < 0 or not is_terminal(sys.stderr) or os.environ.get("TERM") == "dumb":
-        yield _Plain(talk)
+        yield _Plain(talk, started)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -39,14 +44,15 @@ def progress_bar(talk: Talk, total: int | None = None) -> Iterator[Silent]:
     console = Console(stderr=True, no_color=not talk.colored(sys.stderr), highlight=False)
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting (the first run compiles)", total=total, figures="")
-        yield _Bar(talk, bar, task)
+        yield _Bar(talk, started, bar, task)
 
 
 class _Plain(Silent):
-    """No bar; only says once why the first scan took so long."""
+    """No bar; only says what was chosen, and why the first scan took so long."""
 
-    def __init__(self, talk: Talk) -> None:
+    def __init__(self, talk: Talk, started: Callable[[], None]) -> None:
         self._talk = talk
+        self._tell_start = started
         self._began = perf_counter()
         self._started = False
 
@@ -54,6 +60,7 @@ class _Plain(Silent):
         """A scan is through."""
         if not self._started:
             self._started = True
+            self._tell_start()
             waited_s = perf_counter() - self._began
             if waited_s > SLOW_START_S:
                 self._talk.note(
@@ -63,8 +70,10 @@ class _Plain(Silent):
 
 
 class _Bar(_Plain):
-    def __init__(self, talk: Talk, bar: RichProgress, task: TaskID) -> None:
-        super().__init__(talk)
+    def __init__(
+        self, talk: Talk, started: Callable[[], None], bar: RichProgress, task: TaskID
+    ) -> None:
+        super().__init__(talk, started)
         self._bar = bar
         self._task = task
         self._shown = 0.0

@@ -3,33 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
 from typing import Any, get_type_hints
 
-from bsmap_cli.mapping.alignment import AlignmentSettings
-from bsmap_cli.mapping.association import AssociationSettings
-from bsmap_cli.mapping.fitting import FittingSettings
-from bsmap_cli.mapping.merging import MergingSettings
-from bsmap_cli.mapping.segmentation import SegmentationSettings
-from bsmap_cli.sensor.gate import SensorSettings
 from bsmap_cli.settings import setting
+from bsmap_cli.slam.slam_settings import SlamSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class Settings(SlamSettings):
     """Every setting of bsmap: one attribute a section, named as in the settings file."""
 
     degree: int = setting(3, "degree of the curves", symbol="d", minimum=2, maximum=5)
     ladder: tuple[float, ...] = setting(
         (0.4, 0.2, 0.1), "knot steps of the levels, coarse to fine [m]", symbol="Delta"
     )
-    sensor: SensorSettings = field(default_factory=SensorSettings)
-    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
-    association: AssociationSettings = field(default_factory=AssociationSettings)
-    fitting: FittingSettings = field(default_factory=FittingSettings)
-    alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
-    merging: MergingSettings = field(default_factory=MergingSettings)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
