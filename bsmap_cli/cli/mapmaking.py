@@ -80,7 +80,7 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
     from bsmap_cli.evaluation.map_statistics import map_statistics
     from bsmap_cli.logs.open_log import open_log
     from bsmap_cli.mapping.map_file import write_map
-    from bsmap_cli.pipeline import completed
+    from bsmap_cli.pipeline import full_report
 
     began = perf_counter()
     if making.json and STDOUT in (making.output, making.traj):
@@ -108,9 +108,14 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         if traj_out is not None:
             write_trajectory(traj_out.open(), run.trajectory)
     ended = perf_counter()
-    report = completed(run, seconds=ended - began, write_s=ended - write_began)
+    report = full_report(
+        run,
+        seconds=ended - began,
+        write_s=ended - write_began,
+        map_report=map_statistics(document, sizes).as_json() if making.json else None,
+    )
     if making.json:
-        print_json({**report, "map": map_statistics(document, sizes).as_json()})
+        print_json(report)
     talk.detail(stage_line(report))
     talk.note(summary_line(report, sizes.file_bytes))
     return code
