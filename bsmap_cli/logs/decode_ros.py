@@ -1,7 +1,7 @@
 """ROS messages, CDR or ROS 1, decoded by the definition that travels in the log.
 
-`sensor_msgs/LaserScan` in its usual definition has a decoder of its own (`decode_laser_scan`),
-ten times as fast; everything else goes through a `rosbags` typestore.
+`LaserScan` and `Odometry` in their usual definitions have decoders of their own (`decode_known`);
+everything else goes through a `rosbags` typestore.
 """
 
 from __future__ import annotations
@@ -12,7 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bsmap_cli.logs.canonical import yaw_of_quaternion
-from bsmap_cli.logs.decode_laser_scan import laser_scan_decoder
+from bsmap_cli.logs.decode_known import (
+    LASER_SCAN_TYPES,
+    ODOMETRY_TYPES,
+    laser_scan_decoder,
+    odometry_decoder,
+)
 from bsmap_cli.logs.decode_point_cloud import cloud_record
 from bsmap_cli.logs.decoding import Decoder
 from bsmap_cli.logs.messages import (
@@ -30,7 +35,6 @@ from bsmap_cli.sensor.scan import Ranges
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-_LASER_SCAN = "sensor_msgs/msg/LaserScan"
 _SCHEMA_LIMIT_BYTES = 1 << 18
 _IDL_SEPARATOR = "=" * 80 + "\n"
 
@@ -39,8 +43,10 @@ def ros_decoder(channel: Channel, *, last_echo: bool) -> Decoder:
     """A decoder for a channel of one of the types of `_RECORDS`."""
     typestore = _typestore_for(channel)
     is_ros1 = channel.encoding == "ros1"
-    if channel.type == _LASER_SCAN and _is_usual_laser_scan(typestore, is_ros1):
+    if channel.type == LASER_SCAN_TYPES[0] and _is_usual(typestore, LASER_SCAN_TYPES, is_ros1):
         return laser_scan_decoder(is_ros1=is_ros1)
+    if channel.type == ODOMETRY_TYPES[0] and _is_usual(typestore, ODOMETRY_TYPES, is_ros1):
+        return odometry_decoder(is_ros1=is_ros1)
     record_of = _RECORDS[channel.type]
     unpack = typestore.deserialize_ros1 if is_ros1 else typestore.deserialize_cdr
 
@@ -86,11 +92,12 @@ def _idl_parts(text: str) -> list[str]:
     return [part.partition("\n")[2] for part in text.split(_IDL_SEPARATOR)[1:]]
 
 
-def _is_usual_laser_scan(typestore: Typestore, is_ros1: bool) -> bool:
+def _is_usual(typestore: Typestore, names: tuple[str, ...], is_ros1: bool) -> bool:
+    """Whether all of the named types are defined as ROS has them."""
     usual = _usual_typestore(is_ros1)
     return all(
         name in typestore.fielddefs and typestore.fielddefs[name][1] == usual.fielddefs[name][1]
-        for name in (_LASER_SCAN, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+        for name in names
     )
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.canonical import float32_value
@@ -10,8 +12,19 @@ from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.sensor.scan import Scan
 
 _TURN_LIMIT_RAD = 1.05 * math.tau
-_STAMP_LIMIT_NS = 2**63
 _STEP_LIMIT_RAD = math.radians(10.0)
+_STAMP_LIMIT_NS = 2**63
+
+
+class _Sweep(NamedTuple):
+    """What scans of one laser have in common."""
+
+    angle_min_rad: float
+    angle_increment_rad: float
+    time_increment_s: float
+    range_min_m: float
+    range_max_m: float
+    is_reversed: bool
 
 
 def scan_of(
@@ -30,38 +43,48 @@ def scan_of(
 
     Raises BadMessageError for a scan without beams or with angles that cannot be.
     """
-    ranges = record.ranges_m
-    count = len(ranges)
-    low, step = record.angle_min_rad, record.angle_increment_rad
-    span_rad = (count - 1) * step
-    if count < 2:
-        raise BadMessageError("a scan without beams")
-    if not (math.isfinite(low) and 0.0 < abs(step) <= _STEP_LIMIT_RAD):
-        raise BadMessageError("a scan whose beam angles are no angles")
-    if abs(span_rad) > _TURN_LIMIT_RAD or abs(low) > 2.0 * math.tau:
-        raise BadMessageError("a scan of more than a turn")
     if abs(stamp_ns) >= _STAMP_LIMIT_NS:
         raise BadMessageError("a stamp beyond 64 bits")
-    time_step = record.time_increment_s if math.isfinite(record.time_increment_s) else 0.0
-    if upside_down:
-        low, step = -low, -step
-    if step < 0.0:
-        low, step, time_step = low - abs(span_rad), -step, -time_step
-        ranges = ranges[::-1].copy()
+    _, _, low, step, time_step, near, far, ranges, _ = record
+    sweep = _sweep((low, step, time_step, near, far), len(ranges), upside_down)
     return Scan(
         stamp_ns=stamp_ns,
-        ranges_m=ranges,
-        angle_min_rad=float32_value(low),
-        angle_increment_rad=float32_value(step),
-        range_min_m=_limit(record.range_min_m, 0.0),
-        range_max_m=_limit(record.range_max_m, math.inf),
-        time_increment_s=float32_value(time_step),
+        ranges_m=ranges[::-1].copy() if sweep.is_reversed else ranges,
+        angle_min_rad=sweep.angle_min_rad,
+        angle_increment_rad=sweep.angle_increment_rad,
+        range_min_m=sweep.range_min_m,
+        range_max_m=sweep.range_max_m,
+        time_increment_s=sweep.time_increment_s,
         pose_base_laser=pose_base_laser,
         pose_odom_base=pose_odom_base,
         topic=topic,
     )
 
 
-def _limit(stated_m: float, unknown_m: float) -> float:
-    """A limit as the log states it; zero, negative and NaN limits state nothing."""
-    return float32_value(stated_m) if stated_m > 0.0 else unknown_m
+@lru_cache(maxsize=64)
+def _sweep(
+    numbers: tuple[float, float, float, float, float], count: int, upside_down: bool
+) -> _Sweep:
+    low, step, time_step, near, far = numbers
+    span_rad = abs((count - 1) * step)
+    if count < 2:
+        raise BadMessageError("a scan without beams")
+    if not (math.isfinite(low) and 0.0 < abs(step) <= _STEP_LIMIT_RAD):
+        raise BadMessageError("a scan whose beam angles are no angles")
+    if span_rad > _TURN_LIMIT_RAD or abs(low) > 2.0 * math.tau:
+        raise BadMessageError("a scan of more than a turn")
+    if not math.isfinite(time_step):
+        time_step = 0.0
+    if upside_down:
+        low, step = -low, -step
+    is_reversed = step < 0.0
+    if is_reversed:
+        low, step, time_step = low - span_rad, -step, -time_step
+    return _Sweep(
+        float32_value(low),
+        float32_value(step),
+        float32_value(time_step),
+        float32_value(near) if near > 0.0 else 0.0,
+        float32_value(far) if far > 0.0 else math.inf,
+        is_reversed,
+    )

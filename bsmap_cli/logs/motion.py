@@ -70,7 +70,7 @@ class OdometryTopic:
         self.buffer: OdometryBuffer | None = OdometryBuffer()
         self.base_frame = base_frame or child_frame or None
         self._report = report
-        self._pose_child_base = SE2.identity()
+        self._pose_child_base: SE2 | None = None
         if base_frame and child_frame and base_frame != child_frame:
             matrix = tree.matrix(child_frame, base_frame)
             if matrix is None:
@@ -89,8 +89,10 @@ class OdometryTopic:
             return
         if not record.oriented:
             self._report.warn(f"{topic} has orientations of zeros: they are taken as heading 0")
-        pose = SE2(record.x_m, record.y_m, record.yaw_rad) @ self._pose_child_base
-        self.buffer.push(record.stamp_ns or log_time_ns, pose.x, pose.y, pose.theta)
+        x_m, y_m, yaw_rad = record.x_m, record.y_m, record.yaw_rad
+        if self._pose_child_base is not None:
+            x_m, y_m, yaw_rad = (SE2(x_m, y_m, yaw_rad) @ self._pose_child_base).as_array().tolist()
+        self.buffer.push(record.stamp_ns or log_time_ns, x_m, y_m, yaw_rad)
 
     def take_transforms(self, log_time_ns: int, records: list[TransformRecord]) -> None:
         """Nothing to do."""

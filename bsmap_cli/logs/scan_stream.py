@@ -89,7 +89,8 @@ class ScanStream:
                 self._motion.take_odometry(channel.topic, log_time_ns, record)
             else:
                 self._motion.take_transforms(log_time_ns, record)
-            yield from self._settled(log_time_ns)
+            if self._waiting:
+                yield from self._settled(log_time_ns)
         yield from self._settled(None)
 
     def _queue(self, topic: str, log_time_ns: int, record: LaserRecord | CloudRecord) -> bool:
