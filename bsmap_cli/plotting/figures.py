@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -11,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+
+from bsmap_cli.exchange.rounding import round_length
 
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
 
@@ -116,12 +117,6 @@ def draw_colour_bar(sheet: Sheet, mappable: ScalarMappable, label: str, *, left:
     bar.ax.set_title(label, color=sheet.theme.ink, fontsize=8, pad=3)
     for spine in bar.ax.spines.values():
         spine.set_visible(False)
-
-
-def round_length(length_m: float) -> float:
-    """The greatest of 1, 2, 5 times a power of ten that is not longer."""
-    power = 10.0 ** math.floor(math.log10(length_m))
-    return max(step for step in (1.0, 2.0, 5.0) if step * power <= length_m * (1 + 1e-9)) * power
 
 
 def save_figure(figure: Figure, stream: BinaryIO, format_: str) -> None:

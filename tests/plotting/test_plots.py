@@ -11,7 +11,7 @@ from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.evaluation.trajectory_error import absolute_error, match_poses
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.plotting import plot_error, plot_map, save_figure
-from bsmap_cli.plotting.figures import DARK, LIGHT, round_length
+from bsmap_cli.plotting.figures import DARK, LIGHT
 from bsmap_cli.sensor.trajectory import Trajectory
 from tests.maps import line_points, make_level, room_document
 
@@ -73,13 +73,6 @@ def test_the_scale_bar_is_as_long_as_it_says():
     bar = footer.transData.transform(footer.lines[0].get_xydata())[:, 0]
     assert label == "1 m"
     assert np.ptp(bar) / pixels_per_metre == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(
-    ("length", "rounded"), [(1.0, 1.0), (4.99, 2.0), (5.0, 5.0), (0.07, 0.05), (730.0, 500.0)]
-)
-def test_round_lengths(length, rounded):
-    assert round_length(length) == pytest.approx(rounded)
 
 
 def test_control_points_and_knots_are_marked():

@@ -1,0 +1,110 @@
+"""What of a map is exported: levels, and the pieces of their curves within a box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.map_document import MapDocument, MapLevel
+from bsmap_cli.mapping.sampling import SLIVER, DrawnPieces, drawn_pieces, evaluate
+from bsmap_cli.sensor.trajectory import Trajectory
+
+Box = tuple[float, float, float, float]  # x0, y0, x1, y1 [m]
+
+CLIP_STEP = 0.125  # [knot steps]: shorter dips into or out of the box are not seen
+BISECTIONS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class SelectedLevel:
+    """A level and the pieces of its curves that are exported."""
+
+    level: MapLevel
+    pieces: DrawnPieces
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What the writers of this room write.
+
+    path : (m, 3) float64 x, y [m], yaw [rad]: the trajectory, or the map's own thinned path.
+    stamps_ns : (m,) int64 stamps of the trajectory; None where only the map's path is known.
+    """
+
+    document: MapDocument
+    levels: tuple[SelectedLevel, ...]
+    path: NDArray[np.float64]
+    stamps_ns: NDArray[np.int64] | None = None
+
+    @property
+    def frame(self) -> str:
+        """The name of the map's frame."""
+        return str(self.document.meta.get("frame", "map"))
+
+
+def select(
+    document: MapDocument,
+    *,
+    level: float | None = None,
+    clip: Box | None = None,
+    trajectory: Trajectory | None = None,
+) -> Selection:
+    """Choose the level of a knot step [m], else the finest or all parts; keep what is in the box.
+
+    UsageError where the map has no such level.
+    """
+    levels = []
+    for chosen in document.chosen_levels(level):
+        pieces = drawn_pieces(chosen)
+        levels.append(SelectedLevel(chosen, clipped(chosen, pieces, clip) if clip else pieces))
+    if trajectory is None:
+        return Selection(document, tuple(levels), document.path.astype(np.float64))
+    return Selection(document, tuple(levels), trajectory.poses, trajectory.stamps_ns)
+
+
+def clipped(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:
+    """The parts of the pieces that lie within the box, its border included."""
+    counts = np.maximum(np.ceil((pieces.end - pieces.start) / CLIP_STEP), 1).astype(np.int64) + 1
+    piece = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = number / (counts[piece] - 1)
+    u = (1.0 - share) * pieces.start[piece] + share * pieces.end[piece]
+    inside = _within(evaluate(level, pieces.curve[piece], u)[0], box)
+
+    joined = piece[1:] == piece[:-1]
+    enters = np.flatnonzero(joined & ~inside[:-1] & inside[1:])
+    leaves = np.flatnonzero(joined & inside[:-1] & ~inside[1:])
+    first = np.flatnonzero(inside & np.concatenate(([True], ~joined))[: len(inside)])
+    last = np.flatnonzero(inside & np.concatenate((~joined, [True]))[: len(inside)])
+    # both lists are in the order of the samples, and each start has its end
+    start_rows, end_rows = np.concatenate((first, enters)), np.concatenate((last, leaves))
+    starts = np.concatenate((u[first], _crossing(level, pieces.curve[piece], u, enters, box)))
+    ends = np.concatenate((u[last], _crossing(level, pieces.curve[piece], u, leaves, box)))
+    start_order, end_order = np.argsort(start_rows), np.argsort(end_rows)
+    curve = pieces.curve[piece[start_rows[start_order]]]
+    starts, ends = starts[start_order], ends[end_order]
+    long = ends - starts > SLIVER
+    return DrawnPieces(curve[long], starts[long], ends[long])
+
+
+def _within(points: Points, box: Box) -> NDArray[np.bool_]:
+    x0, y0, x1, y1 = box
+    x, y = points[:, 0], points[:, 1]
+    return np.asarray((x >= x0) & (x <= x1) & (y >= y0) & (y <= y1))
+
+
+def _crossing(
+    level: MapLevel, curve: NDArray[np.int64], u: Vector, rows: NDArray[np.int64], box: Box
+) -> Vector:
+    """Where the curve crosses the border between each of the samples and the next."""
+    outer_first = ~_within(evaluate(level, curve[rows], u[rows])[0], box)
+    outside = np.where(outer_first, u[rows], u[rows + 1])
+    inside = np.where(outer_first, u[rows + 1], u[rows])
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (outside + inside)
+        within = _within(evaluate(level, curve[rows], middle)[0], box)
+        outside, inside = np.where(within, outside, middle), np.where(within, middle, inside)
+    return inside
