@@ -71,6 +71,7 @@ def insert_clusters(
             settings.fitting.penalty,
             settings.fitting.first_penalty,
             settings.merging.roughest * step,
+            settings.merging.method == "table",
         )
         if done < count:
             curve_map.reserve(int(curve_map.arrays.sizes[3]))

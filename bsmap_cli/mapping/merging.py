@@ -29,6 +29,7 @@ from bsmap_cli.mapping.fitting import (
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.runs import BEGIN, CURVE, END, KNOWN_BEGIN, KNOWN_END
 from bsmap_cli.mapping.span_index import remove_span
+from bsmap_cli.mapping.table_merge import merge_by_table
 from bsmap_cli.settings import setting
 
 LEAST_WEIGHT = 1e-3  # of a control point that only the tip of its basis function has seen
@@ -152,17 +153,19 @@ def merge_run(
     max_weight: float,
     penalty: float,
     roughest_m: float,
+    by_table: bool,
 ) -> bool:
     """Fit points with known parameters on the lattice of a curve and average the fit into it.
 
-    curve : -1 starts a new one. False, and nothing changed, where the fit misses the points by
+    curve : -1 starts a new one. by_table : by Table I, after a fit that knows nothing of the map.
+    False, and nothing changed, where the fit misses the points by
     more than `roughest_m`: foliage and clutter are no curves.
     """
     degree = matrix.shape[0] - 1
     low, high = lattice_domain(np.min(u), np.max(u))
     first, count = low - degree, high - low + degree
     known, is_known = np.zeros((count, 2)), np.zeros(count)
-    if curve >= 0:
+    if curve >= 0 and not by_table:
         shift = level.offset[curve] + first - level.first[curve]
         for i in range(count):
             row = shift + i
@@ -172,15 +175,19 @@ def merge_run(
                 is_known[i] = 1.0
     fitted, omega = np.empty((count, 2)), np.empty(count)
     if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):
-        return curve
+        return False
     _observed_share(u, weights, matrix, low, omega)
     moved = False
+    map_first = map_end = first
     if curve < 0:
         curve = _start_curve(level, first, count)
     else:
+        map_first, map_end = level.first[curve], level.first[curve] + level.count[curve]
         moved = extend_rows(level, curve, first, first + count)
     offset = level.offset[curve] + first - level.first[curve]
-    for i in range(count):
+    if by_table:
+        merge_by_table(level, curve, map_first, map_end, first, fitted, degree, max_weight)
+    for i in range(0 if by_table else count):
         row = offset + i
         share = min(1.0, omega[i])
         old = level.weights[row]
@@ -272,6 +279,7 @@ def merge_runs(
     penalty: float,
     first_penalty: float,
     roughest_m: float,
+    by_table: bool,
 ) -> int:
     """Merge the runs from `resume` on; returns the first one that finds no room, or their number."""
     for r in range(resume, len(runs)):
@@ -300,6 +308,7 @@ def merge_runs(
             max_weight,
             penalty,
             roughest_m,
+            by_table,
         )
         known_begin, known_end = runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]
         if not merged and known_begin < known_end and known_end - known_begin < end - begin:
@@ -315,5 +324,6 @@ def merge_runs(
                 max_weight,
                 penalty,
                 roughest_m,
+                by_table,
             )
     return len(runs)
