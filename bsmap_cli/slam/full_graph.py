@@ -37,7 +37,7 @@ def solve_full_graph(local: LocalSlam, loops: list[Loop]) -> tuple[Points, int]:
         step = keyframes[k - 1].pose_local.inverse() @ keyframes[k].pose_local
         way = math.hypot(step.x, step.y)
         deviation = way_deviation(
-            way, unit, degenerate_m=way * keyframes[k].degenerate, weak=keyframes[k].weak
+            way, unit, coasted_m=keyframes[k].coasted_m, weak=keyframes[k].weak
         )
         edges.add(k - 1, k, step.as_array(), isotropic_information(deviation), loop=False)
     for loop in loops:

@@ -55,7 +55,8 @@ class Keyframe:
 
     scan_index : its place in the trajectory. pose_local : (3,) where tracking saw the base, in
     the drifting local frame. submap : index of the submap it was matched against.
-    information : (3, 3) of that match. weak : tracking had lost the map here.
+    information : (3, 3) of that match. coasted_m : what the way from the last keyframe may be off
+    because no wall told. weak : tracking had lost the map here.
     """
 
     index: int
@@ -64,7 +65,7 @@ class Keyframe:
     clusters: CompactClusters
     submap: int
     information: Vector
-    degenerate: bool
+    coasted_m: float
     weak: bool
 
 

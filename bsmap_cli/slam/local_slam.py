@@ -47,6 +47,7 @@ class LocalSlam:
     finished: int = 0
     _pose: SE2 = field(default_factory=SE2.identity)
     _lost_scans: int = 0
+    _coasted_m: float = 0.0
     _predictor: Predictor = field(init=False)
 
     def __post_init__(self) -> None:
@@ -75,6 +76,8 @@ class LocalSlam:
         if not lost and told:
             pose = self._older.pose_local @ SE2.from_array(result.pose)
         self._lost_scans = self._lost_scans + 1 if lost else 0
+        if result.degenerate or lost or not told:
+            self._coasted_m += prediction.drift_m
         self._predictor.observe(self._pose.inverse() @ pose, pose_odom_base)
         self._pose = pose
         keyframe = None
@@ -137,10 +140,11 @@ class LocalSlam:
             clusters=CompactClusters.pack(clusters[-1]),
             submap=self.finished,
             information=result.information if result else np.zeros((3, 3)),
-            degenerate=bool(result and result.degenerate),
+            coasted_m=self._coasted_m,
             weak=weak,
         )
         self.keyframes.append(keyframe)
+        self._coasted_m = 0.0
         for submap in self.submaps[self.finished :]:
             submap.insert(keyframe.index, clusters, submap.to_submap(self._pose))
         full = self.settings.submaps.keyframes

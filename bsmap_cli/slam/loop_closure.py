@@ -109,14 +109,8 @@ class LoopCloser:
             reach_m = settings.deviations * float(metres[submap.index])
             reach_rad = settings.deviations * float(radians[submap.index])
             reach_m = min(reach_m, settings.max_reach * unit)
-            local = (self.graph.poses[submap.index].inverse() @ here).as_array()
-            seen = np.array(
-                [
-                    submap.to_submap(self.local.keyframes[k].pose_local).as_array()[:2]
-                    for k in submap.keyframes[::4]
-                ]
-            )
-            distance = float(np.hypot(*(seen - local[:2]).T).min())
+            seen = self.graph.poses[submap.index].inverse() @ here
+            distance = min(math.hypot(x - seen.x, y - seen.y) for x, y in submap.viewpoints[::4])
             if distance < view_m + reach_m:
                 found.append((distance / (view_m + reach_m), submap, reach_m, reach_rad))
         found.sort(key=lambda entry: (entry[0], entry[1].index))
@@ -193,7 +187,15 @@ class LoopCloser:
         keyframe = self.local.keyframes[loop.keyframe]
         submap = self.local.submaps[keyframe.submap]
         pose_submap_submap = loop.pose_submap_base @ submap.to_submap(keyframe.pose_local).inverse()
-        self.graph.add_loop(loop.submap, submap.index, pose_submap_submap, loop.information)
+        expected = self.graph.poses[loop.submap].inverse() @ self.graph.poses[submap.index]
+        gap = expected.inverse() @ pose_submap_submap
+        self.graph.add_loop(
+            loop.submap,
+            submap.index,
+            pose_submap_submap,
+            loop.information,
+            urgent=math.hypot(gap.x, gap.y) > self.local.settings.ladder[-1],
+        )
 
     def _confirm(self, loop: Loop, keyframe: Keyframe) -> None:
         """Two closures agree when both ask for the same correction of the present place."""

@@ -11,6 +11,9 @@ from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.settings import setting
 
 
+ODOMETRY_DRIFT = 0.1  # of the way: what raw odometry slips at its worst
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictionSettings:
     """Deviation of the prediction from the truth, for one scan."""
@@ -29,11 +32,16 @@ class PredictionSettings:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """`step` is the motion in the body frame since the last scan; information: of pose, map axes."""
+    """`step` is the motion in the body frame since the last scan.
+
+    sigma_m, sigma_rad : how far the true step may be off. drift_m : what a step adds to the error
+    of the way where nothing but this prediction is known.
+    """
 
     step: SE2
     sigma_m: float
     sigma_rad: float
+    drift_m: float
 
     def information(self) -> Points:
         """(3, 3) inverse covariance; the same in every frame, as translation has no direction."""
@@ -54,15 +62,16 @@ class Predictor:
         settings = self.settings
         if pose_odom_base is not None and self._odometry is not None:
             step = self._odometry.inverse() @ pose_odom_base
+            way = math.hypot(step.x, step.y)
             return Prediction(
                 step,
-                settings.odometry_sigma * self.unit_m + math.hypot(step.x, step.y),
+                settings.odometry_sigma * self.unit_m + way,
                 math.radians(settings.odometry_sigma_deg) + abs(step.theta),
+                ODOMETRY_DRIFT * way,
             )
+        sigma_m = settings.motion_sigma * self.unit_m
         return Prediction(
-            self.last_step,
-            settings.motion_sigma * self.unit_m,
-            math.radians(settings.motion_sigma_deg),
+            self.last_step, sigma_m, math.radians(settings.motion_sigma_deg), sigma_m
         )
 
     def observe(self, step: SE2, pose_odom_base: SE2 | None) -> None:

@@ -29,6 +29,7 @@ from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
 
+TANGENT_NOISE = 2.0  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
@@ -46,9 +47,10 @@ class RegistrationSettings:
         0.5, "a matched point counts as inlier, not below 3 sigma [knot steps]", minimum=0.0
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
-    degenerate_ratio: float = setting(
-        0.01,
-        "smaller eigenvalue ratios of the information leave a direction unobserved",
+    degenerate: float = setting(
+        3.0,
+        "a direction is observed when its information exceeds so many times what the noise of "
+        "the curves' tangents alone would feign",
         minimum=0.0,
     )
 
@@ -58,7 +60,7 @@ class RegistrationResult:
     """How a registration went.
 
     pose : (3,) x, y [m], theta [rad] of the body in the map frame.
-    information : (3, 3) of the data alone, without the prior.
+    information : (3, 3) of the data alone, without the prior; nothing in degenerate directions.
     inlier_ratio : share of the scan's points that lie on the map; rms_m : of their residuals.
     degenerate : directions, 0 to 3, in which the prediction was kept.
     """
@@ -90,12 +92,16 @@ def _accumulate(
     gradient: Vector,
     tally: Vector,
 ) -> None:
-    """Sum the normal equations of all matched points; tally: inliers, their squares, lever^2, weight."""
+    """Sum the normal equations of all matched points.
+
+    tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
+    information that noisy tangents feign along a straight wall.
+    """
     degree = matrix.shape[0] - 1
     polynomial = np.empty((degree + 1, 2))
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
-    inliers = squares = lever = total = 0.0
+    inliers = squares = lever = total = feigned = 0.0
     for j in range(len(points)):
         qx = cos * points[j, 0] - sin * points[j, 1]
         qy = sin * points[j, 0] + cos * points[j, 1]
@@ -144,6 +150,7 @@ def _accumulate(
         g2 -= weight * j2 * residual
         lever += weight * (qx * qx + qy * qy)
         total += weight
+        feigned += weight * TANGENT_NOISE * variances[j] / max(level.weights[row + 1], 0.1)
         if abs(residual) <= inlier_m:
             inliers += 1.0
             squares += residual * residual
@@ -152,16 +159,18 @@ def _accumulate(
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = h02, h12, h22
     gradient[0], gradient[1], gradient[2] = g0, g1, g2
     tally[0], tally[1], tally[2], tally[3] = inliers, squares, lever, total
+    tally[4] = feigned / (knot_step_m * knot_step_m)
 
 
 @njit(cache=True)
 def keep_unobserved(
-    hessian: Points, lever_m: float, ratio: float, wanted: Vector, delta: Vector
+    hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
 ) -> int:
     """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
 
-    Eigenvalues are judged with angles scaled by the lever arm, so that metres compare with
-    metres, and without the prior, which must not make a corridor look observed.
+    Directions are judged with angles scaled by the lever arm, so that metres compare with metres,
+    and without the prior, which must not make a corridor look observed. What the noise feigned
+    there is taken out of `hessian`.
     """
     scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
     lever = max(lever_m, 1e-9)
@@ -171,7 +180,7 @@ def keep_unobserved(
     symmetric_eigen3(scaled, values, vectors)
     found = 0
     for k in range(3):
-        if values[k] >= ratio * values[2] and values[2] > 0.0:
+        if values[k] > least:
             continue
         found += 1
         missing = 0.0
@@ -181,6 +190,9 @@ def keep_unobserved(
         for i in range(3):
             scale = lever if i == 2 else 1.0
             delta[i] += missing * vectors[i, k] / scale
+            for m in range(3):
+                other = lever if m == 2 else 1.0
+                hessian[i, m] -= values[k] * vectors[i, k] * vectors[m, k] * scale * other
     return found
 
 
@@ -199,7 +211,7 @@ def _register(
     kernel_m: float,
     inlier_m: float,
     iterations: int,
-    degenerate_ratio: float,
+    degenerate: float,
     hessian: Points,
     tally: Vector,
 ) -> tuple[int, int]:
@@ -207,7 +219,7 @@ def _register(
     rows, places = np.full(len(points), -1), np.empty(len(points))
     gradient, system = np.empty(3), np.empty((3, 3))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
-    degenerate = 0
+    found = 0
     steps = 0
     for _ in range(iterations):
         _accumulate(
@@ -238,13 +250,13 @@ def _register(
                 right[i] += prior_information[i, k] * wanted[k]
         solve3(system, right, delta)
         lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
-        degenerate = keep_unobserved(hessian, lever, degenerate_ratio, wanted, delta)
+        found = keep_unobserved(hessian, lever, degenerate * tally[4], wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
         moved = math.hypot(delta[0], delta[1]) + lever * abs(delta[2])
         if moved < 1e-3 * knot_step_m:
             break
-    return steps, degenerate
+    return steps, found
 
 
 def register(
@@ -267,7 +279,7 @@ def register(
     sigma_m : range noise [m].
     """
     step = curve_map.knot_step_m
-    pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(4)
+    pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(5)
     variances = sigma_m**2 / clusters.counts + (MODEL_ERROR * step) ** 2
     steps, degenerate = _register(
         curve_map.arrays,
@@ -283,7 +295,7 @@ def register(
         max(settings.kernel * step, 2.0 * sigma_m),
         max(settings.inlier * step, 3.0 * sigma_m),
         iterations or settings.iterations,
-        settings.degenerate_ratio,
+        settings.degenerate,
         hessian,
         tally,
     )

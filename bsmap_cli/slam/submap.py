@@ -26,6 +26,7 @@ class Submap:
     """Curves in the frame of the submap's first keyframe, one map a knot step, coarse to fine.
 
     pose_local : the submap in the local frame of tracking, which drifts.
+    viewpoints : where its keyframes stood, submap frame [m].
     """
 
     def __init__(self, index: int, pose_local: SE2, settings: MappingSettings) -> None:
@@ -33,6 +34,7 @@ class Submap:
         self.pose_local = pose_local
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self.keyframes: list[int] = []
+        self.viewpoints: list[tuple[float, float]] = []
         self._settings = settings
         self._likelihood: tuple[int, Likelihood] | None = None
 
@@ -46,6 +48,7 @@ class Submap:
         for level, seen in zip(self.levels, clusters, strict=True):
             insert_clusters(level, seen, pose, self._settings)
         self.keyframes.append(keyframe)
+        self.viewpoints.append((pose_submap_base.x, pose_submap_base.y))
 
     def likelihood(self, *, cell_m: float, heights: int) -> Likelihood:
         """What searches look at, for the curves as they stand; kept until they change."""

@@ -23,10 +23,15 @@ class SubmapGraph:
         self.poses: list[SE2] = []
         self._links: list[tuple[float, float]] = []
         self._loops = EdgeList()
-        self._stale = False
+        self._stale = self._urgent = False
+        self._deviations: dict[int, tuple[Vector, Vector]] = {}
 
     def update(self) -> None:
-        """Take in submaps begun since, and optimise anew where loops were added."""
+        """Take in submaps begun since, and optimise anew where loops were added.
+
+        A closure that moves the map is taken in at once, others when the next submap begins.
+        """
+        begun = len(self.poses) < len(self._local.submaps)
         submaps = self._local.submaps
         while len(self.poses) < len(submaps):
             k = len(self.poses)
@@ -36,17 +41,27 @@ class SubmapGraph:
             step = submaps[k - 1].to_submap(submaps[k].pose_local)
             self.poses.append(self.poses[-1] @ step)
             self._links.append(self._link_deviation(k))
-        if self._stale:
-            self._optimise()
-            self._stale = False
+        if begun or self._urgent:
+            self._deviations.clear()
+            if self._stale:
+                self._optimise()
+            self._stale = self._urgent = False
 
-    def add_loop(self, i: int, j: int, pose_i_j: SE2, information: Points) -> None:
+    def add_loop(
+        self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool
+    ) -> None:
         """A closure saw submap j from submap i."""
         self._loops.add(i, j, pose_i_j.as_array(), information, loop=True)
         self._stale = True
+        self._urgent = self._urgent or urgent
 
     def deviations_from(self, submap: int) -> tuple[Vector, Vector]:
         """Deviation [m] and [rad] of every submap relative to one, along the surest chain."""
+        if submap not in self._deviations:
+            self._deviations[submap] = self._surest_chains(submap)
+        return self._deviations[submap]
+
+    def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import dijkstra
 
@@ -72,17 +87,16 @@ class SubmapGraph:
         begin, end = local.submaps[k - 1].keyframes[0], local.submaps[k - 1].keyframes[-1] + 1
         if local.submaps[k].keyframes:
             end = local.submaps[k].keyframes[0] + 1
-        way = degenerate = 0.0
+        way = coasted = 0.0
         weak = False
         for index in range(begin + 1, min(end, len(local.keyframes))):
             frame = local.keyframes[index]
             step = local.keyframes[index - 1].pose_local.inverse() @ frame.pose_local
-            length = math.hypot(step.x, step.y)
-            way += length
-            degenerate += length if frame.degenerate else 0.0
+            way += math.hypot(step.x, step.y)
+            coasted += frame.coasted_m
             weak = weak or frame.weak
         unit = local.settings.ladder[-1]
-        return way_deviation(way, unit, degenerate_m=degenerate, weak=weak)
+        return way_deviation(way, unit, coasted_m=coasted, weak=weak)
 
     def _optimise(self) -> None:
         edges = EdgeList()

@@ -10,7 +10,6 @@ from bsmap_cli.geometry.se2 import Points
 
 DRIFT_SHARE = 0.01  # of the way travelled: what registration against a fresh map loses
 DRIFT_RAD_PER_STEP = 0.0001  # turn lost per finest knot step of way
-DEGENERATE_SHARE = 0.10  # of the way where the walls say nothing about it
 WEAK_STEPS, WEAK_RAD = 10.0, 0.35  # a lost stretch: finest knot steps, radians
 FLOOR_STEPS, FLOOR_RAD = 0.2, 0.003  # what no registration goes below
 
@@ -30,10 +29,10 @@ def match_information(hessian: Points, knot_step_m: float, *, frame_rad: float) 
 
 
 def way_deviation(
-    way_m: float, knot_step_m: float, *, degenerate_m: float = 0.0, weak: bool = False
+    way_m: float, knot_step_m: float, *, coasted_m: float = 0.0, weak: bool = False
 ) -> tuple[float, float]:
-    """Deviation [m], [rad] that tracking gathers along a way."""
-    metres = FLOOR_STEPS * knot_step_m + DRIFT_SHARE * way_m + DEGENERATE_SHARE * degenerate_m
+    """Deviation [m], [rad] that tracking gathers along a way; `coasted_m` of it without walls."""
+    metres = FLOOR_STEPS * knot_step_m + DRIFT_SHARE * way_m + coasted_m
     radians = FLOOR_RAD + DRIFT_RAD_PER_STEP * way_m / knot_step_m
     if weak:
         metres, radians = metres + WEAK_STEPS * knot_step_m, radians + WEAK_RAD
