@@ -78,8 +78,8 @@ def _curves(
         shape = " ".join(_bezier_path(beziers[k]) for k in own)
         lines.append(
             f'<path id="{prefix}curve-{level.curve_ids[curve]}" class="weight-{kind}"'
-            f' data-weight="{weight:.3g}" data-tau="{level.tau_start_m[curve]}'
-            f' {level.tau_end_m[curve]}" data-flags="{level.flags[curve]}" d="{shape}"/>'
+            f' data-weight="{weight:.3g}" data-tau="{level.tau_start_m[curve]!s}'
+            f' {level.tau_end_m[curve]!s}" data-flags="{level.flags[curve]}" d="{shape}"/>'
         )
     return lines
 
