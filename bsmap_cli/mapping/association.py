@@ -109,5 +109,7 @@ def match_points(
                 ):
                     curves[j] = curve
                     u[j] = level.first[curve] + degree + row - level.offset[curve] + f
+                    # beyond an end the foot point stops, the parameter goes on
+                    u[j] += (ex * dx + ey * dy) / (speed * knot_step_m)
                     break
                 row = -1
