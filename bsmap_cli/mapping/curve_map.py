@@ -8,8 +8,10 @@ import numpy as np
 from numba import njit
 
 from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.curve import Curve
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.centroid_tracking import Tracks
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.span_index import EMPTY, insert_span, remove_span
@@ -75,6 +77,7 @@ class CurveMap:
     """All curves of one knot step; frame: the one in which curves were inserted.
 
     The state is `arrays`; kernels write into it. `reserve` makes room before they run.
+    tracks : the clusters of the last scan, where they are tracked by their centroids.
     """
 
     def __init__(self, knot_step_m: float, degree: int, *, rows: int = 256) -> None:
@@ -82,9 +85,24 @@ class CurveMap:
         self.degree = degree
         self.matrix = basis_matrix(degree)
         self.arrays = _empty_level(64, rows, 512)
+        self.tracks: Tracks | None = None
 
     def __len__(self) -> int:
         return int(self.arrays.sizes[0])
+
+    def curve(self, index: int) -> Curve:
+        """One curve as it stands: a copy."""
+        arrays, step = self.arrays, self.knot_step_m
+        rows = slice(int(arrays.offset[index]), int(arrays.offset[index] + arrays.count[index]))
+        return Curve(
+            degree=self.degree,
+            knot_step_m=step,
+            first_index=int(arrays.first[index]),
+            control_points=arrays.points[rows].copy(),
+            weights=arrays.weights[rows].copy(),
+            tau_start_m=float(arrays.support[index, 0]) * step,
+            tau_end_m=float(arrays.support[index, 1]) * step,
+        )
 
     def reserve(self, rows: int) -> None:
         """Make room for `rows` further control points, as many spans and one more curve."""

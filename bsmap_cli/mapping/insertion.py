@@ -11,6 +11,7 @@ from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.merging import merge_runs
 from bsmap_cli.mapping.runs import plan_runs
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.mapping.tracked_insertion import insert_tracked
 
 
 def rotate(pose: Vector, vectors: Points) -> Points:
@@ -26,11 +27,14 @@ def insert_clusters(
     settings: MappingSettings,
 ) -> None:
     """Match, fit and merge; frame of the map = frame of the pose."""
-    n = len(clusters.points)
+    points = rotate(pose_map_body, clusters.points) + pose_map_body[:2]  # eq. (2)
+    if settings.association.method == "centroid":
+        insert_tracked(curve_map, points, clusters.starts, settings)
+        return
+    n = len(points)
     if n == 0:
         return
     step = curve_map.knot_step_m
-    points = rotate(pose_map_body, clusters.points) + pose_map_body[:2]
     tangents = rotate(pose_map_body, clusters.tangents)
     curves, u = np.empty(n, np.int64), np.zeros(n)
     match_points(

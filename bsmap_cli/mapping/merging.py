@@ -129,7 +129,7 @@ def _start_curve(level: LevelArrays, first: int, count: int) -> int:
 
 
 @njit(cache=True)
-def _observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: Vector) -> None:
+def observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: Vector) -> None:
     """omega_g = sum_j (ds_j / Delta) B_g(tau_j): 1 inside the data whatever their density."""
     order = matrix.shape[0]
     basis = np.empty(order)
@@ -139,6 +139,59 @@ def _observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega:
         basis_weights(matrix, u[j] - low - span, basis)
         for a in range(order):
             omega[span + a] += weights[j] * basis[a]
+
+
+@njit(cache=True)
+def merge_fitted(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    curve: int,
+    first: int,
+    fitted: Points,
+    omega: Vector,
+    start_u: float,
+    end_u: float,
+    max_weight: float,
+    by_table: bool,
+) -> int:
+    """Average control points, the first at lattice index `first`, into a curve; its index.
+
+    curve : -1 starts a new one. Data support [start_u, end_u]. by_table : by Table I, otherwise
+    each with its share `omega`.
+    """
+    count = len(fitted)
+    moved = False
+    map_first = map_end = first
+    if curve < 0:
+        curve = _start_curve(level, first, count)
+    else:
+        map_first, map_end = level.first[curve], level.first[curve] + level.count[curve]
+        moved = extend_rows(level, curve, first, first + count)
+    offset = level.offset[curve] + first - level.first[curve]
+    if by_table:
+        degree = matrix.shape[0] - 1
+        merge_by_table(level, curve, map_first, map_end, first, fitted, degree, max_weight)
+    for i in range(0 if by_table else count):
+        row = offset + i
+        share = min(1.0, omega[i])
+        old = level.weights[row]
+        if old <= 0.0:
+            level.points[row] = fitted[i]
+            level.weights[row] = max(share, LEAST_WEIGHT)
+        else:
+            new = min(max_weight, old + share)
+            gain = share / max(new, LEAST_WEIGHT)  # the running mean, then a fading one
+            level.points[row, 0] += gain * (fitted[i, 0] - level.points[row, 0])
+            level.points[row, 1] += gain * (fitted[i, 1] - level.points[row, 1])
+            level.weights[row] = new
+    level.support[curve, 0] = min(level.support[curve, 0], start_u)
+    level.support[curve, 1] = max(level.support[curve, 1], end_u)
+    level.seen[curve] += 1
+    if moved:
+        offset, count = level.offset[curve], level.count[curve]
+    refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
+    return curve
 
 
 @njit(cache=True)
@@ -162,7 +215,8 @@ def merge_run(
     more than `roughest_m`: foliage and clutter are no curves.
     """
     degree = matrix.shape[0] - 1
-    low, high = lattice_domain(np.min(u), np.max(u))
+    start_u, end_u = np.min(u), np.max(u)
+    low, high = lattice_domain(start_u, end_u)
     first, count = low - degree, high - low + degree
     known, is_known = np.zeros((count, 2)), np.zeros(count)
     if curve >= 0 and not by_table:
@@ -176,36 +230,20 @@ def merge_run(
     fitted, omega = np.empty((count, 2)), np.empty(count)
     if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):
         return False
-    _observed_share(u, weights, matrix, low, omega)
-    moved = False
-    map_first = map_end = first
-    if curve < 0:
-        curve = _start_curve(level, first, count)
-    else:
-        map_first, map_end = level.first[curve], level.first[curve] + level.count[curve]
-        moved = extend_rows(level, curve, first, first + count)
-    offset = level.offset[curve] + first - level.first[curve]
-    if by_table:
-        merge_by_table(level, curve, map_first, map_end, first, fitted, degree, max_weight)
-    for i in range(0 if by_table else count):
-        row = offset + i
-        share = min(1.0, omega[i])
-        old = level.weights[row]
-        if old <= 0.0:
-            level.points[row] = fitted[i]
-            level.weights[row] = max(share, LEAST_WEIGHT)
-        else:
-            new = min(max_weight, old + share)
-            gain = share / max(new, LEAST_WEIGHT)  # the running mean, then a fading one
-            level.points[row, 0] += gain * (fitted[i, 0] - level.points[row, 0])
-            level.points[row, 1] += gain * (fitted[i, 1] - level.points[row, 1])
-            level.weights[row] = new
-    level.support[curve, 0] = min(level.support[curve, 0], np.min(u))
-    level.support[curve, 1] = max(level.support[curve, 1], np.max(u))
-    level.seen[curve] += 1
-    if moved:
-        offset, count = level.offset[curve], level.count[curve]
-    refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
+    observed_share(u, weights, matrix, low, omega)
+    merge_fitted(
+        level,
+        matrix,
+        knot_step_m,
+        curve,
+        first,
+        fitted,
+        omega,
+        start_u,
+        end_u,
+        max_weight,
+        by_table,
+    )
     return True
 
 

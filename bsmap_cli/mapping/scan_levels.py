@@ -24,12 +24,21 @@ def scan_levels(
     fitting: FittingSettings,
     sigma_m: float,
 ) -> list[Clusters]:
-    """Segment at the finest knot step, eq. (3), and widen the bins for the coarser ones."""
-    finest = find_clusters(
-        returns,
-        segmentation,
-        knot_step_m=ladder[-1],
-        bin_m=fitting.thinning * ladder[-1],
-        sigma_m=sigma_m,
-    )
-    return coarser_levels(finest, ladder, fitting, sigma_m)
+    """Segment at the finest knot step, eq. (3), and widen the bins for the coarser ones.
+
+    With `segmentation.each_level` every knot step is segmented on its own, as in the paper.
+    """
+    steps = ladder if segmentation.each_level else ladder[-1:]
+    found = [
+        find_clusters(
+            returns,
+            segmentation,
+            knot_step_m=step,
+            bin_m=fitting.thinning * step,
+            sigma_m=sigma_m,
+        )
+        for step in steps
+    ]
+    if segmentation.each_level:
+        return found
+    return coarser_levels(found[0], ladder, fitting, sigma_m)

@@ -35,6 +35,9 @@ class SegmentationSettings:
     beam_gap: bool = setting(
         True, "widen max_gap where beams lie far apart; off: the constant of eq. (3)"
     )
+    each_level: bool = setting(
+        False, "segment anew for each knot step; off: once at the finest, and widen the bins"
+    )
 
 
 @dataclass(frozen=True, slots=True)
