@@ -7,7 +7,6 @@ Exit codes: 0 done; 1 could not; 2 usage or settings; 3 done, but something was 
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from typing import Any
 
 import typer
 
+from bsmap_cli.cli.signals import catch_signals, ending_signal
 from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import BsmapError, ConfigError, UsageError
 
@@ -28,7 +28,7 @@ def run(arguments: Sequence[str]) -> int:
     """Parse the arguments, run the command and return the exit code; standard output is flushed."""
     from bsmap_cli.cli.app import build_app
 
-    _turn_signals_into_exceptions()
+    catch_signals()
     code = guarded(lambda: build_app(arguments)(list(arguments), "bsmap", standalone_mode=False))
     flushed = guarded(_flush_output)
     return code or flushed
@@ -43,17 +43,26 @@ def guarded(action: Callable[[], Any], talk: Talk | None = None) -> int:
         if _pipe_was_closed(end):
             _discard_output()
             return DONE
+        if ending_signal() is not None:
+            return _interrupted(talk)
         return _code(end.code if isinstance(end, SystemExit) else COULD_NOT)
     except KeyboardInterrupt:
-        talk.error("interrupted")
-        return INTERRUPTED
+        return _interrupted(talk)
     except Exception as error:
+        if ending_signal() is not None:  # Ctrl-C in the middle of a compilation looks like a fault
+            return _interrupted(talk)
         if talk.level >= 2:
             traceback.print_exc()
         talk.error(_one_line(error))
         usage = isinstance(error, UsageError | ConfigError | ParserError)
         return USAGE if usage else COULD_NOT
     return _code(code)
+
+
+def _interrupted(talk: Talk) -> int:
+    talk.error("interrupted")
+    number = ending_signal()
+    return INTERRUPTED if number is None else 128 + number
 
 
 def _code(value: object) -> int:
@@ -117,15 +126,3 @@ def _discard_output() -> None:
         except BrokenPipeError:
             os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
-
-
-def _turn_signals_into_exceptions() -> None:
-    """A terminated run cleans up as an interrupted one does: temporary files go."""
-
-    def leave(number: int, _frame: object) -> None:
-        raise SystemExit(128 + number)
-
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, leave)

@@ -12,6 +12,7 @@ from secrets import token_hex
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO
 
+from bsmap_cli.cli.signals import end_if_asked
 from bsmap_cli.cli.talk import is_terminal
 from bsmap_cli.errors import BsmapError, UsageError
 
@@ -92,6 +93,7 @@ class Outputs:
                 target.discard()
 
     def _commit(self) -> None:
+        end_if_asked()
         for target in self._targets:
             target.finish()
         for target in sorted(self._targets, key=lambda target: target.path == STDOUT):

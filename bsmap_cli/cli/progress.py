@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from bsmap_cli.cli.signals import end_if_asked
 from bsmap_cli.cli.talk import Talk, is_terminal
 from bsmap_cli.pipeline import Silent
 
@@ -58,6 +59,7 @@ class _Plain(Silent):
 
     def scans(self, count: int, span_s: float) -> None:
         """A scan is through."""
+        end_if_asked()
         if not self._started:
             self._started = True
             self._tell_start()

@@ -1,0 +1,31 @@
+"""What the tests of the command line share: logs and a map made once."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.cli.tool import bsmap
+
+SAMPLES = Path(__file__).parent.parent.parent / "sample_logs"
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """A folder with run.mcap, truth.tum, map.bsm and map.tum of one short run; read only."""
+    folder = tmp_path_factory.mktemp("made")
+    shutil.copy(SAMPLES / "spin.bag", folder / "run.bag")
+    shutil.copy(SAMPLES / "spin.truth.tum", folder / "truth.tum")
+    assert bsmap("scans", "run.bag", "-o", "run.mcap", "-q", cwd=folder).returncode == 0
+    ran = bsmap("slam", "run.mcap", "-o", "map.bsm", "--traj", "map.tum", "-q", cwd=folder)
+    assert ran.returncode == 0, ran.stderr
+    return folder
+
+
+@pytest.fixture
+def here(made, tmp_path):
+    """A fresh folder with the files of `made`."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return tmp_path

@@ -1,0 +1,73 @@
+"""Ctrl-C and its kin: the right exit code, one line, nothing left behind."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import SAMPLES
+from tests.cli.tool import BSMAP, environment, names
+
+
+def wait_until_it_listens(process):
+    """Until the command catches SIGTERM: before that, Python itself is still starting."""
+    status = Path(f"/proc/{process.pid}/status")
+    while status.exists() and process.poll() is None:
+        caught = next(line for line in status.read_text().splitlines() if "SigCgt" in line)
+        if int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1:
+            return
+        time.sleep(0.01)
+
+
+def interrupted(folder, number, after_s, *arguments, **changes):
+    """Send a signal to a running command; its exit code and what it said."""
+    process = subprocess.Popen(
+        [BSMAP, *map(str, arguments)],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment(**changes),
+    )
+    wait_until_it_listens(process)
+    time.sleep(after_s)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert b"Traceback" not in said, said.decode()
+    return process.returncode, said.decode()
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)],
+)
+def test_an_interrupted_run_leaves_nothing(number, code, tmp_path):
+    command = ("sim", "campus", "-o", "campus.mcap", "--truth", "campus.tum")  # takes minutes
+    ended, said = interrupted(tmp_path, number, 1.0, *command)
+    assert ended == code
+    assert said == "error: interrupted\n"
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.2, 1.0, 3.0, 5.5])
+def test_ctrl_c_is_caught_from_the_start_and_in_the_compiler(after_s, tmp_path):
+    cache = tmp_path / "cache"  # empty: everything is compiled anew
+    folder = tmp_path / "run"
+    folder.mkdir()
+    command = ("slam", SAMPLES / "loop.csv.gz", "-q", "-o", "map.bsm")
+    ended, said = interrupted(folder, signal.SIGINT, after_s, *command, NUMBA_CACHE_DIR=str(cache))
+    assert ended == 130
+    assert said in ("", "error: interrupted\n")
+    assert names(folder) == []
+
+
+def test_a_killed_run_leaves_nothing_that_looks_finished(tmp_path):
+    command = ("sim", "campus", "-o", "campus.mcap")
+    ended, _ = interrupted(tmp_path, signal.SIGKILL, 1.0, *command)
+    assert ended == -signal.SIGKILL
+    assert not (tmp_path / "campus.mcap").exists()
+    assert all(name.startswith(".campus.mcap.") for name in names(tmp_path))
