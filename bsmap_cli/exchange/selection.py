@@ -32,12 +32,14 @@ class Selection:
 
     path : (m, 3) float64 x, y [m], yaw [rad]: the trajectory, or the map's own thinned path.
     stamps_ns : (m,) int64 stamps of the trajectory; None where only the map's path is known.
+    clip : the box that the pieces were cut to.
     """
 
     document: MapDocument
     levels: tuple[SelectedLevel, ...]
     path: NDArray[np.float64]
     stamps_ns: NDArray[np.int64] | None = None
+    clip: Box | None = None
 
     @property
     def frame(self) -> str:
@@ -60,9 +62,10 @@ def select(
     for chosen in document.chosen_levels(level):
         pieces = drawn_pieces(chosen)
         levels.append(SelectedLevel(chosen, clipped(chosen, pieces, clip) if clip else pieces))
-    if trajectory is None:
-        return Selection(document, tuple(levels), document.path.astype(np.float64))
-    return Selection(document, tuple(levels), trajectory.poses, trajectory.stamps_ns)
+    path, stamps_ns = document.path.astype(np.float64), None
+    if trajectory is not None:
+        path, stamps_ns = trajectory.poses, trajectory.stamps_ns
+    return Selection(document, tuple(levels), path, stamps_ns, clip)
 
 
 def clipped(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.mapping.map_document import MapLevel
+from bsmap_cli.geometry.basis import MAX_DEGREE, MIN_DEGREE
+from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 
 LARGEST_INDEX = 2**30
+MOST_LEVELS = 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +28,27 @@ class Fault:
 def find_fault(level: MapLevel, points: int) -> Fault | None:
     """The first broken rule, if any; the curves must add up to `points` control points."""
     return next(_faults(level, points), None)
+
+
+def document_fault(document: MapDocument) -> str | None:
+    """The first rule that a whole map breaks, in words; None where it is sound."""
+    steps = [level.knot_step_m for level in document.levels]
+    if not steps or len(steps) > MOST_LEVELS or sorted(set(steps), reverse=True) != steps:
+        return f"expected 1 to {MOST_LEVELS} levels, coarse to fine, found knot steps {steps}"
+    if not (np.isfinite(steps).all() and steps[-1] > 0.0):
+        return f"expected knot steps above 0, found {steps}"
+    if not MIN_DEGREE <= document.degree <= MAX_DEGREE:
+        return f"expected a degree from {MIN_DEGREE} to {MAX_DEGREE}, found {document.degree}"
+    for level in document.levels:
+        if level.degree != document.degree:
+            return f"expected levels of degree {document.degree}, found {level.degree}"
+        fault = find_fault(level, len(level.weights))
+        if fault is not None:
+            return (
+                f"expected {fault.expected}, found {fault.found}"
+                f" (row {fault.row} of {fault.array}, knot step {level.knot_step_m} m)"
+            )
+    return None if np.isfinite(document.path).all() else "expected a finite path"
 
 
 def rows_not_finite(array: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -12,7 +12,7 @@ import numpy as np
 from bsmap_cli.errors import MapFileError
 from bsmap_cli.mapping.chunk_stream import Chunk, ChunkReader, ChunkWriter, refuse
 from bsmap_cli.mapping.level_chunk import LEVEL_HEAD, level_payload, read_level
-from bsmap_cli.mapping.level_rules import find_fault
+from bsmap_cli.mapping.level_rules import document_fault
 from bsmap_cli.mapping.map_chunks import (
     Head,
     head_payload,
@@ -44,7 +44,9 @@ def write_map(
     with_path : keep the thinned path, so that the map alone yields free space.
     MapFileError where the document breaks a rule of the format.
     """
-    _check_document(document)
+    fault = document_fault(document)
+    if fault is not None:
+        raise MapFileError(f"the map cannot be written: {fault}")
     writer = ChunkWriter(stream)
     writer.chunk(b"HEAD", head_payload(document))
     writer.chunk(b"META", meta_payload(document.meta))
@@ -130,20 +132,3 @@ def _check_totals(end: Chunk, head: Head, levels: list[MapLevel]) -> None:
         expected = f"{head.levels} levels, {head.curves} curves, {head.points} control points"
         found = f"{len(levels)} levels, {curves} curves, {points} control points"
         refuse(end.start, expected, found)
-
-
-def _check_document(document: MapDocument) -> None:
-    steps = [level.knot_step_m for level in document.levels]
-    if not steps or len(steps) > 255 or sorted(set(steps), reverse=True) != steps:
-        raise MapFileError(f"a map has 1 to 255 levels, coarse to fine, not {steps}")
-    for level in document.levels:
-        if level.degree != document.degree:
-            raise MapFileError(f"a level of degree {level.degree} in a map of {document.degree}")
-        fault = find_fault(level, len(level.weights))
-        if fault is not None:
-            raise MapFileError(
-                f"the map cannot be written: expected {fault.expected}, found {fault.found}"
-                f" (row {fault.row} of {fault.array}, knot step {level.knot_step_m} m)"
-            )
-    if not np.isfinite(document.path).all():
-        raise MapFileError("the map cannot be written: its path is not finite")

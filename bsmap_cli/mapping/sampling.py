@@ -84,7 +84,11 @@ def sample_level(level: MapLevel, step_m: float) -> LevelSamples:
 
     step_m : greatest distance in tau between neighbours [m]; map curves have about unit speed.
     """
-    pieces = drawn_pieces(level)
+    return sample_pieces(level, drawn_pieces(level), step_m)
+
+
+def sample_pieces(level: MapLevel, pieces: DrawnPieces, step_m: float) -> LevelSamples:
+    """The same for some pieces of the level's curves."""
     length = pieces.end - pieces.start
     intervals = np.maximum(np.ceil(length * (level.knot_step_m / step_m) - SLIVER), 1)
     counts = intervals.astype(np.int64) + 1
