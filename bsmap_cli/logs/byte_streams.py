@@ -11,7 +11,7 @@ from typing import BinaryIO, Protocol
 
 GZIP_MAGIC = b"\x1f\x8b"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-_FEED_BYTES = 4096
+_FEED_BYTES = 512
 _PIECE_BYTES = 1 << 20
 _BUFFER_BYTES = 1 << 17
 
@@ -64,7 +64,7 @@ class _Unpacked(io.RawIOBase):
         self._magic = magic
         self._member: _Decompressor | None = None
         self._waiting = b""
-        self._ready = b""
+        self._ready = memoryview(b"")
         self._ended = False
 
     def readable(self) -> bool:
@@ -90,7 +90,7 @@ class _Unpacked(io.RawIOBase):
         elif not packed:
             raise DamagedBytesError("the compressed data end too early")
         try:
-            self._ready = self._member.decompress(packed)
+            self._ready = memoryview(self._member.decompress(packed))
         except Exception as error:  # zlib.error, zstandard.ZstdError: imported only where used
             raise DamagedBytesError(f"the compressed data are damaged ({error})") from error
         if self._member.eof:

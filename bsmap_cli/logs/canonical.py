@@ -9,8 +9,13 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import SE2, wrap_angle
+from bsmap_cli.sensor.scan import Ranges
 
 YAW_STEP_RAD = 2.0**-30
 """Lattice of headings [rad]: far below any sensor, far above the rounding of a quaternion."""
@@ -24,6 +29,12 @@ def float32_value(value: float) -> float:
         return float(_FLOAT32.unpack(_FLOAT32.pack(value))[0])
     except OverflowError:
         return math.copysign(math.inf, value)
+
+
+def float32_ranges(ranges_m: Sequence[float] | NDArray[np.float64]) -> Ranges:
+    """(n,) ranges [m] rounded to float32; beyond its range infinities."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(ranges_m, dtype=np.float64).astype(np.float32)
 
 
 def canonical_yaw(yaw_rad: float) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from bsmap_cli.errors import LogError
 from bsmap_cli.geometry.se2 import SE2, wrap_angle
-from bsmap_cli.logs.canonical import canonical_pose
+from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
@@ -165,7 +165,7 @@ def _record(
         0.0,
         0.0,
         farthest,
-        np.array(ranges, dtype=np.float64).astype(np.float32),
+        float32_ranges(ranges),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from bsmap_cli.logs.byte_streams import DamagedBytesError
 
 CHUNK_LIMIT_BYTES = 1 << 28
-_FEED_BYTES = 1 << 10
+_FEED_BYTES = 512
 _TRUSTED_RATIO = 256
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.canonical import float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, CloudRecord, LaserRecord
 from bsmap_cli.logs.transforms import Matrix, Mounting
 
@@ -56,7 +57,7 @@ class CloudSlicer:
             0.0,
             0.0,
             math.inf,
-            ranges.astype(np.float32),
+            float32_ranges(ranges),
         )
 
 

@@ -12,15 +12,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.geometry.se2 import SE2
-from bsmap_cli.logs.canonical import canonical_pose
+from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
 from bsmap_cli.logs.text_log import TextScan, lines_of, stamp_ns_of
+from bsmap_cli.sensor.scan import Ranges
 
 TOPIC = "csv"
 _RANGE = re.compile(r"r(\d{1,7})")
@@ -53,24 +52,20 @@ class CsvParser:
         return {}
 
     def scans(self, report: ReadReport) -> Iterator[TextScan | BadMessageError]:
-        """See `TextParser.scans`; a part without a header row has that of the part before."""
-        header: _Header | None = None
+        """See `TextParser.scans`; every part has a header row of its own."""
         for source in self._sources:
-            is_first = True
+            header: _Header | None = None
             for number, line in lines_of(source, report):
                 cells = _cells(line)
                 if not cells:
                     continue
-                if is_first and (names := _names(cells)):
-                    header = self._header(names, source.name)
-                elif header is None:
-                    raise LogError(f"{source.name} has no header row: its columns need names")
-                else:
-                    try:
-                        yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
-                    except (ValueError, BadMessageError) as error:
-                        yield BadMessageError(f"line {number} of {source.name}: {error}")
-                is_first = False
+                if header is None:
+                    header = self._header(_names(cells), source.name)
+                    continue
+                try:
+                    yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
+                except (ValueError, BadMessageError) as error:
+                    yield BadMessageError(f"line {number} of {source.name}: {error}")
 
     def _header(self, names: list[str], source: str) -> _Header:
         columns = {name: index for index, name in enumerate(names)}
@@ -157,25 +152,21 @@ def _cells(line: bytes) -> list[bytes]:
     return text.split(b",") if text else []
 
 
-def _names(cells: list[bytes]) -> list[str] | None:
-    """Column names, or None for a row of numbers."""
-    first = cells[0].strip()
-    try:
-        float(first or b"0")
-    except ValueError:
-        return [cell.strip().decode("utf-8", "replace").lower() for cell in cells]
-    return None
+def _names(cells: list[bytes]) -> list[str]:
+    return [cell.strip().decode("utf-8", "replace").lower() for cell in cells]
 
 
-def _ranges(texts: list[bytes]) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
+def _ranges(texts: list[bytes]) -> Ranges:
     try:
         numbers = list(map(float, texts))
     except ValueError:
         numbers = [float(text) if text.strip() else math.nan for text in texts]
-    return np.array(numbers, dtype=np.float64).astype(np.float32)
+    return float32_ranges(numbers)
 
 
 def is_header(line: bytes) -> bool:
     """Whether a line of text names the columns of a log of scans."""
-    names = _names(_cells(line) or [b"0"]) or []
-    return any(name in ("t", "stamp_ns") or _RANGE.fullmatch(name) for name in names)
+    names = _names(_cells(line))
+    return len(names) > 2 and any(
+        name in ("t", "stamp_ns") or _RANGE.fullmatch(name) for name in names
+    )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bsmap_cli.logs.canonical import yaw_of_quaternion
+from bsmap_cli.logs.canonical import float32_ranges, yaw_of_quaternion
 from bsmap_cli.logs.decode_known import (
     LASER_SCAN_TYPES,
     ODOMETRY_TYPES,
@@ -106,7 +106,7 @@ def _stamp_ns(stamp: Any) -> int:
 
 
 def _laser_scan(message: Any, last_echo: bool) -> LaserRecord:
-    return _laser_record(message, np.array(message.ranges, dtype=np.float32))
+    return _laser_record(message, float32_ranges(message.ranges))
 
 
 def _multi_echo(message: Any, last_echo: bool) -> LaserRecord:

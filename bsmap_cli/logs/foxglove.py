@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.logs.canonical import float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord, plain_frame
 
 
@@ -28,8 +29,6 @@ def laser_record(
         raise BadMessageError("a scan without beams")
     if pose is not None and not any(pose[3:]):
         pose = (*pose[:3], 0.0, 0.0, 0.0, 1.0)
-    with np.errstate(over="ignore"):
-        ranges_m = ranges.astype(np.float32)
     return LaserRecord(
         stamp_ns,
         plain_frame(frame),
@@ -38,6 +37,6 @@ def laser_record(
         0.0,
         0.0,
         math.inf,
-        ranges_m,
+        float32_ranges(ranges),
         pose,
     )

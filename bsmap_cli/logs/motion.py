@@ -11,7 +11,7 @@ from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.messages import OdometryRecord, TransformRecord
 from bsmap_cli.logs.odometry import OdometryBuffer
 from bsmap_cli.logs.reader import ReadReport
-from bsmap_cli.logs.transforms import TransformTree, planar_pose
+from bsmap_cli.logs.transforms import FARTHEST_M, TransformTree, planar_pose
 
 
 class Motion(Protocol):
@@ -84,7 +84,8 @@ class OdometryTopic:
         """Push the pose of a message of this topic."""
         if topic != self.name or self.buffer is None:
             return
-        if not (math.isfinite(record.x_m + record.y_m) and math.isfinite(record.yaw_rad)):
+        is_sane = abs(record.x_m) < FARTHEST_M and abs(record.y_m) < FARTHEST_M
+        if not (is_sane and math.isfinite(record.yaw_rad)):
             self._report.warn(f"{topic} has poses that are no numbers: they are passed over")
             return
         if not record.oriented:

@@ -85,6 +85,7 @@ def _kind_of(source: Source) -> str | None:
 def _text_kind(stream: BinaryIO) -> tuple[str | None, bytes]:
     """The format of text by its first telling line, and all that was read to find it."""
     read = b""
+    is_first = True
     while len(read) < _SNIFFED_TEXT_BYTES and (line := stream.readline(_SNIFFED_TEXT_BYTES)):
         read += line
         words = line.split(None, 1)
@@ -94,6 +95,7 @@ def _text_kind(stream: BinaryIO) -> tuple[str | None, bytes]:
             continue
         if words[0] in (carmen.FLASER, carmen.ROBOTLASER, *carmen.OTHER_WORDS):
             return "CARMEN", read
-        if csv_scans.is_header(line):
+        if is_first and csv_scans.is_header(line):
             return "CSV", read
+        is_first = False
     return None, read

@@ -234,6 +234,8 @@ def _index_of(file: BinaryIO) -> ContainerIndex | None:
         else:
             for _ in connections.take(_kind(fields), fields, memoryview(data)):
                 pass
+    if len(spans) != int.from_bytes(header[0].get(b"chunk_count", b""), "little"):
+        return None
     return ContainerIndex(
         counts={channel: counts.get(key, 0) for key, channel in connections.channels.items()},
         start_ns=min((start for start, _ in spans), default=0),

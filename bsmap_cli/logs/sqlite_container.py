@@ -30,17 +30,21 @@ class SqliteContainer:
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._source = source
+        self._is_cut = False
 
     def index(self) -> ContainerIndex | None:
         """Counted by the database; None for a stream or a damaged file."""
-        if self._source.plain_path is None:
+        path = self._source.plain_path
+        if path is None or _is_cut_file(path):
             return None
         try:
             with self._connect() as database:
                 channels = _channels(database)
                 rows = list(database.execute(_COUNTS))
-        except (sqlite3.Error, DamagedBytesError):
+        except (sqlite3.Error, DamagedBytesError, OSError):
             return None  # damage is told when the messages are read
+        if not all(isinstance(number, int) for row in rows for number in row):
+            return None
         counts = {topic: count for topic, count, _, _ in rows}
         return ContainerIndex(
             counts={channel: counts.get(topic, 0) for topic, channel in channels.items()},
@@ -65,25 +69,47 @@ class SqliteContainer:
                 for topic, log_time_ns, data in rows:
                     if isinstance(data, bytes) and isinstance(log_time_ns, int):
                         yield wanted[topic], log_time_ns, _unpacked(data)
-        except (sqlite3.Error, DamagedBytesError) as error:
+                if self._is_cut:
+                    raise DamagedBytesError("the file is cut off")
+        except (sqlite3.Error, DamagedBytesError, OSError) as error:
             report.lose(f"{self.name}: {error}; what comes before is used")
 
     @contextmanager
     def _connect(self) -> Iterator[sqlite3.Connection]:
         with ExitStack() as stack:
             path = self._source.plain_path
-            if path is None:
-                path = stack.enter_context(_copied(self._source))
+            if path is None or _is_cut_file(path):
+                path = stack.enter_context(self._copied())
             yield stack.enter_context(closing(_open_database(path)))
 
+    @contextmanager
+    def _copied(self) -> Iterator[Path]:
+        """A temporary copy, unpacked; of a cut file the whole pages, as a torn one reads as 0."""
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "log.db3"
+            with self._source.open() as stream, copy.open("wb") as file:
+                try:
+                    shutil.copyfileobj(stream, file, 1 << 20)
+                except DamagedBytesError:
+                    self._is_cut = True
+            if _is_cut_file(copy):
+                self._is_cut = True
+                with copy.open("r+b") as file:
+                    file.truncate(copy.stat().st_size // _page_bytes(copy) * _page_bytes(copy))
+            yield copy
 
-@contextmanager
-def _copied(source: Source) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder, source.open() as packed:
-        copy = Path(folder) / "log.db3"
-        with copy.open("wb") as file:
-            shutil.copyfileobj(packed, file, 1 << 20)
-        yield copy
+
+def _page_bytes(path: Path) -> int:
+    with path.open("rb") as file:
+        size = int.from_bytes(file.read(18)[16:], "big")
+    return 65536 if size == 1 else max(size, 1)
+
+
+def _is_cut_file(path: Path) -> bool:
+    """Whether a file has fewer pages than its header says."""
+    with path.open("rb") as file:
+        pages = int.from_bytes(file.read(32)[28:], "big")
+    return path.stat().st_size < pages * _page_bytes(path)
 
 
 def _open_database(path: Path) -> sqlite3.Connection:

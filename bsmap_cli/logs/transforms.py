@@ -19,6 +19,9 @@ Matrix = NDArray[np.float64]
 ODOM_NAME = "odom"
 BASE_NAMES = ("base_footprint", "base_link", "base")
 _WORLD_NAMES = ("map", "world", "earth")
+FARTHEST_M = 1e9
+"""Coordinates beyond this are no coordinates."""
+
 _TILT_LIMIT_RAD = math.radians(10.0)
 _STILL_M, _STILL_COS = 1e-3, math.cos(math.radians(0.1))
 
@@ -159,19 +162,22 @@ def _last(frame: str) -> str:
 
 def matrix_of(translation: Sequence[float], quaternion: Sequence[float]) -> Matrix | None:
     """(4, 4) matrix of x, y, z [m] and a quaternion x, y, z, w; None where they are no numbers."""
-    numbers = np.array((*translation, *quaternion), dtype=np.float64)
-    length = float(np.linalg.norm(numbers[3:]))
-    if not (np.isfinite(numbers).all() and length > 1e-6):
+    length = math.hypot(*quaternion)
+    if not (all(map(_is_sane, translation)) and 1e-6 < length < 1e6):
         return None
-    x, y, z, w = (numbers[3:] / length).tolist()
+    x, y, z, w = (number / length for number in quaternion)
     matrix = np.eye(4)
     matrix[:3, :3] = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
         (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
         (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
     )
-    matrix[:3, 3] = numbers[:3]
+    matrix[:3, 3] = translation
     return matrix
+
+
+def _is_sane(length_m: float) -> bool:
+    return abs(length_m) < FARTHEST_M
 
 
 def _differ(a: Matrix, b: Matrix) -> bool:
