@@ -12,14 +12,14 @@ import typer.main
 
 from bsmap_cli.cli.app import build_app
 from bsmap_cli.cli.help import option_rows, usage_pieces
-from bsmap_cli.cli.options import READING, SETTINGS, TALKING
+from bsmap_cli.cli.options import READING, SENSOR, SETTINGS, TALKING
 
 INTRODUCTION = """# The command line
 
 This page is made from the commands by `python docs/cli_page.py > docs/cli.md`; a test compares.
 """
 
-SHARED = (READING, SETTINGS, TALKING)  # headings whose options are listed once, in front
+SHARED = (READING, SETTINGS, SENSOR, TALKING)  # headings whose options are listed once, in front
 
 
 def cli_page() -> str:
@@ -80,7 +80,7 @@ def _text(help_text: str) -> Iterator[str]:
 def _table(heading: str, rows: list[tuple[str, str]]) -> str:
     lines = [f"| {heading} | |", "|---|---|"]
     for left, right in rows:
-        if left.startswith("--help"):
+        if "--help" in left:
             continue
         cells = (f"`{left}`".replace("|", "\\|"), right.replace("|", "\\|"))
         lines.append("| " + " | ".join(cells) + " |")

@@ -38,38 +38,34 @@ def guarded(action: Callable[[], Any], talk: Talk | None = None) -> int:
     """Run an action; whatever goes wrong becomes one line and an exit code."""
     talk = talk or Talk()
     try:
-        code = action()
+        value = action()
+        return value if isinstance(value, int) else DONE
     except (BrokenPipeError, SystemExit) as end:
         if _pipe_was_closed(end):
             _discard_output()
             return DONE
-        if ending_signal() is not None:
-            return _interrupted(talk)
-        return _code(end.code if isinstance(end, SystemExit) else COULD_NOT)
-    except KeyboardInterrupt:
-        return _interrupted(talk)
-    except Exception as error:
-        if ending_signal() is not None:  # Ctrl-C in the middle of a compilation looks like a fault
-            return _interrupted(talk)
-        if talk.level >= 2:
-            traceback.print_exc()
-        talk.error(_one_line(error))
-        usage = isinstance(error, UsageError | ConfigError | ParserError)
-        return USAGE if usage else COULD_NOT
-    return _code(code)
+        return _ended(end, talk)
+    except (KeyboardInterrupt, Exception) as error:
+        return _ended(error, talk)
 
 
-def _interrupted(talk: Talk) -> int:
-    talk.error("interrupted")
+def _ended(error: BaseException, talk: Talk) -> int:
+    """Say why the run ends; its exit code."""
     number = ending_signal()
-    return INTERRUPTED if number is None else 128 + number
+    # Ctrl-C in the middle of a compilation may come out as any fault
+    if number is not None or isinstance(error, KeyboardInterrupt):
+        talk.error("interrupted")
+        return INTERRUPTED if number is None else 128 + number
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else COULD_NOT
+    if talk.level >= 2:
+        traceback.print_exception(error)
+    talk.error(_one_line(error))
+    usage = isinstance(error, UsageError | ConfigError | ParserError)
+    return USAGE if usage else COULD_NOT
 
 
-def _code(value: object) -> int:
-    return value if isinstance(value, int) else DONE
-
-
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     """What is wrong and what to do next, on one line."""
     if isinstance(error, BsmapError):
         text = str(error)

@@ -42,7 +42,9 @@ def option_rows(command: Any, ctx: typer.Context) -> dict[str, Rows]:
 def usage_pieces(command: Any, ctx: typer.Context) -> list[str]:
     """`[OPTIONS] LOG...` of one command."""
     arguments = [
-        parameter.metavar if parameter.required else f"[{parameter.metavar}]"
+        parameter.metavar
+        if parameter.required
+        else f"[{parameter.metavar}]".replace("...]", "]...")
         for parameter in command.get_params(ctx)
         if parameter.param_type_name == "argument"
     ]

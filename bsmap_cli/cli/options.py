@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bsmap_cli.config import Settings
     from bsmap_cli.logs.reader import ReadOptions
 
-READING, SETTINGS, TALKING = "Reading the log", "Settings", "Messages"
+READING, SETTINGS, SENSOR, TALKING = "Reading the log", "Settings", "Sensor", "Messages"
 
 
 def option(*names: str, metavar: str | None = None, panel: str | None = None, **more: Any) -> Any:
@@ -225,7 +225,7 @@ class SensorFlags:
         option(
             "--range",
             metavar="MIN,MAX",
-            panel=SETTINGS,
+            panel=SENSOR,
             help="Use returns between these distances [m] only.",
         ),
     ] = None
@@ -234,7 +234,7 @@ class SensorFlags:
         option(
             "--ignore-angles",
             metavar="A,B",
-            panel=SETTINGS,
+            panel=SENSOR,
             help="Ignore beams from A to B degrees, where the robot sees itself; repeatable.",
         ),
     ] = None

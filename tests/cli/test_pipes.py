@@ -7,6 +7,7 @@ import shutil
 
 import pytest
 
+from tests.cli.conftest import SCANS
 from tests.cli.tool import BSMAP, bsmap, message, names, shell
 
 
@@ -119,7 +120,7 @@ def test_an_empty_pipe_is_an_empty_log(tmp_path):
 def test_results_go_to_standard_output_and_talk_to_standard_error(here):
     ran = bsmap("slam", "run.mcap", "-o", "-", cwd=here)
     assert ran.stdout.startswith(b"\x89BSM\r\n\x1a\n")
-    assert ran.stderr.decode().splitlines()[-1].startswith("65 scans, ")
+    assert ran.stderr.decode().splitlines()[-1].startswith(f"{SCANS} scans, ")
     ran = bsmap("stats", "-", cwd=here, stdin=ran.stdout)
     assert ran.stderr == b""
 
