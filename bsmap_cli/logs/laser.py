@@ -12,7 +12,6 @@ from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.sensor.scan import Scan
 
 _TURN_LIMIT_RAD = 1.05 * math.tau
-_STEP_LIMIT_RAD = math.radians(10.0)
 _STAMP_LIMIT_NS = 2**63
 
 
@@ -69,7 +68,7 @@ def _sweep(
     span_rad = abs((count - 1) * step)
     if count < 2:
         raise BadMessageError("a scan without beams")
-    if not (math.isfinite(low) and 0.0 < abs(step) <= _STEP_LIMIT_RAD):
+    if not (math.isfinite(low) and 0.0 < abs(step) <= math.pi):
         raise BadMessageError("a scan whose beam angles are no angles")
     if span_rad > _TURN_LIMIT_RAD or abs(low) > 2.0 * math.tau:
         raise BadMessageError("a scan of more than a turn")

@@ -96,12 +96,10 @@ class ScanStream:
     def _queue(self, topic: str, log_time_ns: int, record: LaserRecord | CloudRecord) -> bool:
         """Let a scan wait for its odometry; False when no more scans are asked for."""
         stamp_ns = record.stamp_ns
-        if topic in self._frozen:
+        if topic in self._frozen or (stamp_ns == 0 and log_time_ns != 0):
+            how = "are zero" if stamp_ns == 0 else "stand still"
+            self._report.warn(f"stamps of {topic} {how}: the time of recording is used")
             stamp_ns = log_time_ns
-            self._report.warn(f"the stamps of {topic} stand still: the time of recording is used")
-        elif stamp_ns == 0 and log_time_ns != 0:
-            stamp_ns = log_time_ns
-            self._report.warn(f"stamps of {topic} are zero: the time of recording is used")
         verdict = self._window.judge(stamp_ns, topic)
         if verdict is not Verdict.TAKE:
             return verdict is Verdict.SKIP
