@@ -49,3 +49,26 @@ def freeze_level(curve_map: CurveMap, *, max_weight: int, min_seen: int = 1) -> 
         control_points=np.concatenate([np.zeros((0, 2)), *points]).astype(np.float32),
         weights=np.clip(rounded, 1, max_weight).astype(np.uint8),
     )
+
+
+def join_levels(parts: list[MapLevel]) -> MapLevel:
+    """The curves of several levels of one knot step and one frame as one level, numbered anew."""
+    joined = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in (
+            "tau_start_m",
+            "tau_end_m",
+            "flags",
+            "observations",
+            "first_indices",
+            "point_counts",
+            "control_points",
+            "weights",
+        )
+    }
+    return MapLevel(
+        degree=parts[0].degree,
+        knot_step_m=parts[0].knot_step_m,
+        curve_ids=np.arange(len(joined["flags"]), dtype=np.uint32),
+        **joined,
+    )

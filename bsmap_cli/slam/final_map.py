@@ -28,6 +28,9 @@ class FinalMapSettings:
     rounds: int = setting(
         2, "times that every keyframe is registered against the whole map", minimum=0
     )
+    rebuild: bool = setting(
+        True, "build the map anew with the final poses; off: keep what tracking built"
+    )
     levels: int = setting(2, "levels of the ladder, from the finest up, used for that", minimum=1)
 
 

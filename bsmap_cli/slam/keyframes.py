@@ -70,7 +70,7 @@ class Keyframe:
 
 
 def is_keyframe(step: SE2, settings: KeyframeSettings, finest_step_m: float) -> bool:
-    """Has the base moved or turned enough since the last keyframe?"""
-    return math.hypot(step.x, step.y) > settings.distance * finest_step_m or abs(
+    """Has the base moved or turned enough since the last keyframe? With 0, every scan has."""
+    return math.hypot(step.x, step.y) >= settings.distance * finest_step_m or abs(
         step.theta
-    ) > math.radians(settings.angle_deg)
+    ) >= math.radians(settings.angle_deg)

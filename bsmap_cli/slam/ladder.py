@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.slam.curve_matching import match_curves
 from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings, register
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
 
 
 def register_down(
@@ -26,3 +33,47 @@ def register_down(
         )
         pose = result.pose
     return result
+
+
+def track_down(
+    levels: list[CurveMap],
+    clusters: list[Clusters],
+    start_pose: Vector,
+    prior_pose: Vector,
+    prior_information: Points,
+    *,
+    sigma_m: float,
+    settings: SlamSettings,
+) -> RegistrationResult:
+    """Register the scan that follows the last one, by the method that is set.
+
+    Where curves are registered to curves, the points say in the end how well the pose fits.
+    """
+    method = settings.registration.method
+    by_curves = {"points": 0, "joint_first": 1}.get(method, len(levels))
+    pose = start_pose
+    for level, seen in zip(levels[:by_curves], clusters[:by_curves], strict=True):
+        pose = match_curves(
+            level, seen, pose, prior_pose, prior_information, sigma_m=sigma_m, settings=settings
+        )
+    if by_curves < len(levels):
+        return register_down(
+            levels[by_curves:],
+            clusters[by_curves:],
+            pose,
+            prior_pose,
+            prior_information,
+            sigma_m=sigma_m,
+            settings=settings.registration,
+        )
+    judged = register(
+        levels[-1],
+        clusters[-1],
+        pose,
+        prior_pose,
+        prior_information,
+        sigma_m=sigma_m,
+        settings=settings.registration,
+        iterations=1,
+    )
+    return replace(judged, pose=pose)

@@ -11,7 +11,7 @@ import numpy as np
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
-from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.ladder import track_down
 from bsmap_cli.slam.prediction import Prediction, Predictor
 from bsmap_cli.slam.recovery import recover
 from bsmap_cli.slam.registration import RegistrationResult
@@ -100,14 +100,14 @@ class LocalSlam:
         last = submap.to_submap(self._pose)
         predicted = (last @ prediction.step).as_array()
         information = prediction.information()
-        result = register_down(
+        result = track_down(
             submap.levels,
             clusters,
             predicted,
             predicted,
             information,
             sigma_m=self.sigma_m,
-            settings=settings.registration,
+            settings=settings,
         )
         if result.inlier_ratio >= settings.recovery.search_below or result.points < FEWEST_POINTS:
             return result

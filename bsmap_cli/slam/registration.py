@@ -37,6 +37,12 @@ MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 class RegistrationSettings:
     """Gauss-Newton of one scan against one level."""
 
+    method: str = setting(
+        "points",
+        "points on map curves; the scan's curves jointly, on all levels or the coarsest alone; or "
+        "each curve alone and a mean of their poses, as in the paper",
+        choices=("points", "joint", "joint_first", "curve"),
+    )
     gate: float = setting(
         0.75, "points farther from every curve are not matched [knot steps]", minimum=0.0
     )

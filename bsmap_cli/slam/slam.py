@@ -22,6 +22,7 @@ from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.submap_graph import SubmapGraph
+from bsmap_cli.slam.tracked_map import tracked_levels
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,15 +118,15 @@ class Slam:
         started = time.perf_counter()
         poses, rejected = solve_full_graph(local, closer.loops)
         solved = time.perf_counter()
-        poses, levels = final_map(poses, local.keyframes, settings, local.sigma_m)
+        cap = settings.merging.max_weight
+        if settings.final_map.rebuild:
+            poses, maps = final_map(poses, local.keyframes, settings, local.sigma_m)
+            levels = tuple(freeze_level(level, max_weight=cap) for level in maps)
+        else:
+            levels = tracked_levels(local.submaps, local.keyframes, poses, max_weight=cap)
         self.seconds["graph"] += solved - started
         self.seconds["final_map"] += time.perf_counter() - solved
-        cap = settings.merging.max_weight
-        document = MapDocument(
-            degree=settings.degree,
-            max_weight=cap,
-            levels=tuple(freeze_level(level, max_weight=cap) for level in levels),
-        )
+        document = MapDocument(degree=settings.degree, max_weight=cap, levels=levels)
         trajectory = self._trajectory(poses)
         figures = {
             "keyframes": len(local.keyframes),

@@ -1,0 +1,59 @@
+"""Register the curves of a scan with the curves of one level: Sec. IV, jointly or one by one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.slam.curve_equations import PairSystem
+from bsmap_cli.slam.curve_pairs import pair_curves
+from bsmap_cli.slam.curve_registration import register_curves
+from bsmap_cli.slam.joint_registration import register_jointly
+from bsmap_cli.slam.registration import MODEL_ERROR
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
+
+SAMPLES_PER_STEP = 2.0  # where all curves are registered at once, long ones weigh more
+ROUNDS = 3  # of pairing anew from the pose found
+
+
+def match_curves(
+    level: CurveMap,
+    clusters: Clusters,
+    start_pose: Vector,
+    prior_pose: Vector,
+    prior_information: Points,
+    *,
+    sigma_m: float,
+    settings: SlamSettings,
+) -> Vector:
+    """(3,) pose of the scan on the level, from `start_pose`."""
+    samples, steps = settings.alignment.samples, settings.registration.iterations
+    if settings.registration.method == "curve":
+        pairs = pair_curves(level, clusters, start_pose, settings)
+        return register_curves(PairSystem(level, pairs, samples=samples), start_pose, steps)[0]
+    step_m = level.knot_step_m
+    kernel_m = max(settings.registration.kernel * step_m, 2.0 * sigma_m)
+    pose = start_pose
+    for _ in range(ROUNDS):
+        before = pose
+        pairs = pair_curves(level, clusters, pose, settings)
+        system = PairSystem(
+            level, pairs, samples=samples, dense=SAMPLES_PER_STEP, kernel_m=2.0 * kernel_m
+        )
+        pose, _ = register_jointly(
+            system,
+            pose,
+            prior_pose,
+            prior_information,
+            variance_m2=sigma_m**2 + (MODEL_ERROR * step_m) ** 2,
+            iterations=steps,
+        )
+        if np.hypot(*(pose - before)[:2]) < 0.05 * step_m:
+            break
+    return pose

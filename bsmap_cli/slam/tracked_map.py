@@ -1,0 +1,26 @@
+"""The map as tracking built it: the curves of all submaps, moved to where the poses put them."""
+
+from __future__ import annotations
+
+from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.freeze import freeze_level, join_levels
+from bsmap_cli.mapping.map_document import MapLevel
+from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.submap import Submap
+
+
+def tracked_levels(
+    submaps: list[Submap], keyframes: list[Keyframe], poses: Points, *, max_weight: int
+) -> tuple[MapLevel, ...]:
+    """Each level of the ladder; poses : (n, 3) of the keyframes in the map frame.
+
+    A submap moves with its first keyframe. What two submaps hold stays double.
+    """
+    parts = []
+    for submap in submaps:
+        first = submap.keyframes[0]
+        seen = submap.to_submap(keyframes[first].pose_local)
+        pose_map_submap = SE2.from_array(poses[first]) @ seen.inverse()
+        moved = [level.moved(pose_map_submap) for level in submap.levels]
+        parts.append([freeze_level(level, max_weight=max_weight) for level in moved])
+    return tuple(join_levels(list(level)) for level in zip(*parts, strict=True))
