@@ -73,7 +73,7 @@ def map_quality(
         max_m=float(distance.max()),
         away_rms_m=rms(away) if len(away) else None,
         coverage=_coverage(level, surfaces, pose_world_map, hits),
-        redundancy=redundancy(level),
+        redundancy=redundancy(level, samples),
         samples=len(points),
     )
 

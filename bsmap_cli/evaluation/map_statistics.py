@@ -94,7 +94,7 @@ def map_statistics(document: MapDocument, sizes: MapSizes) -> MapStatistics:
         degree=document.degree,
         length_m=finest.length_m,
         bounds_m=_bounds(samples[-1]),
-        redundancy=redundancy(document.finest),
+        redundancy=redundancy(document.finest, samples[-1]),
         levels=levels,
         grid_5cm_bytes=grid,
         ratio_to_grid_5cm=_ratio(grid, finest.bytes),

@@ -19,14 +19,15 @@ COS_TURN = math.cos(math.radians(30.0))
 Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
-def redundancy(level: MapLevel) -> float:
+def redundancy(level: MapLevel, samples: LevelSamples | None = None) -> float:
     """All samples over those that no other pass covers; 1 where nothing is drawn twice.
 
     Samples stand every quarter of a knot step. One is covered where another curve, or the same
     one more than two knot steps away in tau, passes within half a knot step in a direction within
-    30 degrees and has a higher (mean weight there, -curve_id).
+    30 degrees and has a higher (mean weight there, -curve_id). `samples` saves sampling again.
     """
-    samples = sample_level(level, level.knot_step_m / SAMPLES_PER_STEP)
+    if samples is None:
+        samples = sample_level(level, level.knot_step_m / SAMPLES_PER_STEP)
     if not len(samples.tau_m):
         return 1.0
     covered = covered_samples(samples, level.curve_ids.astype(np.int64), level.knot_step_m)
@@ -41,31 +42,48 @@ def covered_samples(
     first = np.flatnonzero(np.diff(samples.piece) == 0)  # segments between neighbouring samples
     chord = samples.points[first + 1] - samples.points[first]
     length = np.hypot(chord[:, 0], chord[:, 1])
-    reach_m = REACH * knot_step_m
-    middles = samples.points[first] + 0.5 * chord
-    sample, segment = near_pairs(samples.points, middles, reach_m + 0.5 * length.max(initial=0.0))
+    sample, segment = _meetings(samples, first, chord, length, knot_step_m)
+    weight, ids = samples.weight, curve_ids[samples.curve]
+
+    # cheap conditions first: each leaves fewer pairs to the next
+    other = first[segment]
+    apart = np.abs(samples.tau_m[sample] - samples.tau_m[other]) > APART * knot_step_m
+    apart |= samples.curve[sample] != samples.curve[other]
+    heavy = np.maximum(weight[other], weight[other + 1]) >= weight[sample]
+    keep = np.flatnonzero(apart & heavy)
+    sample, segment = sample[keep], segment[keep]
+    along = (samples.tangents[sample] * chord[segment]).sum(axis=1)
+    keep = np.flatnonzero(along >= COS_TURN * length[segment])
+    sample, segment = sample[keep], segment[keep]
 
     other = first[segment]
-    same_curve = samples.curve[sample] == samples.curve[other]
-    tau_m = np.abs(samples.tau_m[sample] - samples.tau_m[other])
-    keep = ~same_curve | (tau_m > APART * knot_step_m)
-    sample, segment, other = sample[keep], segment[keep], other[keep]
-
+    offset, way = samples.points[sample] - samples.points[other], chord[segment]
     square = np.maximum(length[segment] ** 2, 1e-300)
-    offset = samples.points[sample] - samples.points[other]
-    f = np.clip(np.einsum("ij,ij->i", offset, chord[segment]) / square, 0.0, 1.0)
-    off = offset - f[:, None] * chord[segment]
-    along = np.einsum("ij,ij->i", samples.tangents[sample], chord[segment])
-    weight = samples.weight[other] + f * (samples.weight[other + 1] - samples.weight[other])
-    heavier = _outranks(
-        (weight, curve_ids[samples.curve[other]]),
-        (samples.weight[sample], curve_ids[samples.curve[sample]]),
-    )
-    within = np.hypot(off[:, 0], off[:, 1]) <= reach_m
-    covers = heavier & within & (along >= COS_TURN * length[segment])
+    f = np.clip((offset * way).sum(axis=1) / square, 0.0, 1.0)
+    off = offset - f[:, None] * way
+    there = weight[other] + f * (weight[other + 1] - weight[other])
+    heavier = (there > weight[sample]) | ((there == weight[sample]) & (ids[other] < ids[sample]))
     covered = np.zeros(len(samples.tau_m), bool)
-    covered[sample[covers]] = True
+    covered[sample[heavier & (np.hypot(off[:, 0], off[:, 1]) <= REACH * knot_step_m)]] = True
     return covered
+
+
+def _meetings(
+    samples: LevelSamples,
+    first: NDArray[np.int64],
+    chord: Points,
+    length: Vector,
+    knot_step_m: float,
+) -> Pairs:
+    """Samples and segments that may be within reach; segments that are long meet in parts."""
+    part_m = knot_step_m / SAMPLES_PER_STEP
+    parts = np.maximum(np.ceil(length / part_m - 1e-6), 1).astype(np.int64)
+    segment = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(segment)) - np.repeat(np.cumsum(parts) - parts, parts)
+    share = (number + 0.5) / parts[segment]
+    middles = samples.points[first[segment]] + share[:, None] * chord[segment]
+    sample, part = near_pairs(samples.points, middles, REACH * knot_step_m + 0.51 * part_m)
+    return sample, segment[part]
 
 
 def near_pairs(points: Points, others: Points, reach_m: float) -> Pairs:
@@ -92,10 +110,3 @@ def near_pairs(points: Points, others: Points, reach_m: float) -> Pairs:
         number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         found.append((which, order[begin[which] + number]))
     return np.concatenate([a for a, _ in found]), np.concatenate([b for _, b in found])
-
-
-def _outranks(
-    a: tuple[Vector, NDArray[np.int64]], b: tuple[Vector, NDArray[np.int64]]
-) -> NDArray[np.bool_]:
-    """Whether (weight, -curve_id) of a is higher than that of b."""
-    return np.asarray((a[0] > b[0]) | ((a[0] == b[0]) & (a[1] < b[1])))
