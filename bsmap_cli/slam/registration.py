@@ -29,7 +29,8 @@ from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
 
-TANGENT_NOISE = 2.0  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
+SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
+TANGENT_NOISE = 0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
@@ -40,7 +41,7 @@ class RegistrationSettings:
     method: str = setting(
         "points",
         "points on map curves; the scan's curves jointly, on all levels or the coarsest alone; or "
-        "each curve alone and a mean of their poses, as in the paper",
+        "each curve alone and the mean of their poses, as in the paper",
         choices=("points", "joint", "joint_first", "curve"),
     )
     gate: float = setting(
@@ -54,7 +55,7 @@ class RegistrationSettings:
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
     degenerate: float = setting(
-        3.0,
+        1.0,
         "a direction is observed when its information exceeds so many times what the noise of "
         "the curves' tangents alone would feign",
         minimum=0.0,
@@ -174,6 +175,8 @@ def keep_unobserved(
 ) -> int:
     """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
 
+    `wanted` leads back to where this level began: the prediction, or what a coarser level saw.
+
     Directions are judged with angles scaled by the lever arm, so that metres compare with metres,
     and without the prior, which must not make a corridor look observed. What the noise feigned
     there is taken out of `hessian`.
@@ -225,6 +228,7 @@ def _register(
     rows, places = np.full(len(points), -1), np.empty(len(points))
     gradient, system = np.empty(3), np.empty((3, 3))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
+    start = pose.copy()
     found = 0
     steps = 0
     for _ in range(iterations):
@@ -255,6 +259,8 @@ def _register(
                 system[i, k] = hessian[i, k] + prior_information[i, k]
                 right[i] += prior_information[i, k] * wanted[k]
         solve3(system, right, delta)
+        for i in range(3):
+            wanted[i] = start[i] - pose[i]
         lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
         found = keep_unobserved(hessian, lever, degenerate * tally[4], wanted, delta)
         for i in range(3):
@@ -286,7 +292,7 @@ def register(
     """
     step = curve_map.knot_step_m
     pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(5)
-    variances = sigma_m**2 / clusters.counts + (MODEL_ERROR * step) ** 2
+    variances = SHARED * (sigma_m**2 / clusters.counts + (MODEL_ERROR * step) ** 2)
     steps, degenerate = _register(
         curve_map.arrays,
         curve_map.matrix,
