@@ -30,7 +30,10 @@ _JUDGED_LINES = 100
 _SAME_M, _SAME_RAD = 1e-3, 1e-3
 _FARTHEST_LASER_M = 2.0
 _TAIL = 3  # ipc_stamp, host, logger_stamp
-_KNOWN_STEPS_DEG = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5}
+_USUAL_DEG = {180: (-90.0, 1.0), 181: (-90.0, 1.0), 360: (-90.0, 0.5), 361: (-90.0, 0.5)}
+"""First beam and step by the number of beams; of these there is no doubt."""
+
+_LIKELY_DEG = {540: (-135.0, 0.5), 541: (-135.0, 0.5), 1080: (-135.0, 0.25), 1081: (-135.0, 0.25)}
 
 
 class _Line(NamedTuple):
@@ -122,16 +125,16 @@ class CarmenParser:
     def _angles(self, count: int, report: ReadReport) -> tuple[float, float]:
         """No angle stands in a FLASER line: the count tells, or the user."""
         options = self._options
-        step_deg = _KNOWN_STEPS_DEG.get(count)
         is_told = options.angle_min_rad is not None and options.angle_increment_rad is not None
-        if step_deg is None:
-            step_deg = 180.0 / (count - count % 2)
+        angles_deg = _USUAL_DEG.get(count)
+        if angles_deg is None:
+            angles_deg = _LIKELY_DEG.get(count, (-90.0, 180.0 / (count - count % 2)))
             if not is_told:
                 report.warn(
-                    f"FLASER lines of {count} beams: they are taken to see 180 degrees"
-                    " (else give --angle-min and --angle-increment)"
+                    f"FLASER lines of {count} beams: they are taken to see {-2 * angles_deg[0]:.0f}"
+                    " degrees (else give --angle-min and --angle-increment)"
                 )
-        low, step = -math.pi / 2.0, math.radians(step_deg)
+        low, step = map(math.radians, angles_deg)
         return (
             low if options.angle_min_rad is None else options.angle_min_rad,
             step if options.angle_increment_rad is None else options.angle_increment_rad,

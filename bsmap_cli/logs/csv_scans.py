@@ -22,6 +22,7 @@ from bsmap_cli.logs.text_log import TextScan, lines_of, stamp_ns_of
 from bsmap_cli.sensor.scan import Ranges
 
 TOPIC = "csv"
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _RANGE = re.compile(r"r(\d{1,7})")
 _STAMP_LIMIT = 2**63
 
@@ -148,7 +149,7 @@ class _Fields:
 
 def _cells(line: bytes) -> list[bytes]:
     """The cells of a row; none for an empty line or a comment."""
-    text = line.partition(b"#")[0].replace(b'"', b"").strip().removeprefix(b"\xef\xbb\xbf")
+    text = line.partition(b"#")[0].replace(b'"', b"").strip().removeprefix(BYTE_ORDER_MARK)
     return text.split(b",") if text else []
 
 

@@ -88,7 +88,7 @@ def _text_kind(stream: BinaryIO) -> tuple[str | None, bytes]:
     is_first = True
     while len(read) < _SNIFFED_TEXT_BYTES and (line := stream.readline(_SNIFFED_TEXT_BYTES)):
         read += line
-        words = line.split(None, 1)
+        words = line.removeprefix(csv_scans.BYTE_ORDER_MARK).split(None, 1)
         if b"\0" in line:
             break
         if not words or words[0].startswith(b"#"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from typing import NamedTuple, Protocol
 
 from bsmap_cli.errors import UsageError
@@ -185,6 +185,6 @@ def stamp_ns_of(text: bytes) -> int:
         seconds = Decimal(text.decode("ascii"))
         if seconds.is_finite() and abs(seconds) < _STAMP_LIMIT:
             return int((seconds * SECOND_NS).to_integral_value())
-    except (InvalidOperation, UnicodeDecodeError):
+    except (ArithmeticError, UnicodeDecodeError):
         pass
     raise BadMessageError("a stamp that is no number of seconds")
