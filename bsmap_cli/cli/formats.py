@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
-from bsmap_cli.cli.outputs import STDOUT
 from bsmap_cli.errors import UsageError
 
+MapFormat = Literal["svg", "png", "geojson", "dxf", "yaml", "csv", "json", "ply", "mcap", "bsm"]
 Kind = TypeVar("Kind", bound=str)
 
 LOG_FORMATS: dict[str, Literal["mcap", "bag", "csv"]] = {
@@ -21,6 +21,8 @@ PICTURE_FORMATS: dict[str, Literal["png", "svg", "pdf"]] = {
     ".svg": "svg",
     ".pdf": "pdf",
 }
+MAP_FORMATS: dict[str, MapFormat] = {f".{kind}": kind for kind in get_args(MapFormat)}
+TRAJECTORY_FORMATS = {".csv": "csv", ".json": "json", ".kitti": "kitti"}  # others are TUM
 
 
 def chosen_format(path: str, said: str | None, by_extension: Mapping[str, Kind]) -> Kind:
@@ -36,7 +38,7 @@ def chosen_format(path: str, said: str | None, by_extension: Mapping[str, Kind])
             if kind == said:
                 return kind
         raise UsageError(f"no format {said!r}: choose one of {known}")
-    if path == STDOUT:
+    if path == "-":
         raise UsageError(f"standard output has no extension: give --format ({known})")
     extension = Path(path).suffix.lower()
     if extension not in by_extension:

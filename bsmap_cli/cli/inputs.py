@@ -72,23 +72,35 @@ def text_input(path: str) -> Iterator[Iterator[str]]:
 
 
 def read_trajectory(path: str) -> Trajectory:
-    """A TUM trajectory; LogError where it cannot be read."""
-    from bsmap_cli.exchange.tum import read_tum
+    """A trajectory in TUM, CSV or JSON; LogError where it cannot be read."""
+    from bsmap_cli.exchange import trajectories
 
     with text_input(path) as lines:
-        return read_tum(lines)
+        return trajectories.read_trajectory(lines)
 
 
 def read_map_file(path: str) -> tuple[MapDocument, MapSizes]:
-    """A map and what its parts take in the file; MapFileError names the file and the byte."""
+    """A map, or its twin in JSON, and what its parts take; MapFileError names file and place."""
+    from bsmap_cli.logs.byte_streams import put_back
     from bsmap_cli.mapping.map_file import read_map_with_sizes
 
     with binary_input(path) as stream:
         try:
-            return read_map_with_sizes(stream)
+            first = stream.read(1)
+            whole = put_back(first, stream)
+            return _read_twin(whole) if first == b"{" else read_map_with_sizes(whole)
         except MapFileError as error:
             name = "standard input" if path == STDIN else path
             raise MapFileError(f"{name}: {error}") from error
+
+
+def _read_twin(stream: BinaryIO) -> tuple[MapDocument, MapSizes]:
+    """A map in JSON, with the sizes that its map file would have."""
+    from bsmap_cli.evaluation.map_statistics import sizes_of
+    from bsmap_cli.exchange.map_json import read_map_json
+
+    document = read_map_json(stream)
+    return document, sizes_of(document)
 
 
 def _piped(metavar: str) -> str:

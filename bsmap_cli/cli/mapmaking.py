@@ -106,7 +106,7 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         sizes = write_map(encoded, document, compress=making.compress)
         map_out.open().write(encoded.getbuffer())
         if traj_out is not None:
-            write_trajectory(traj_out.open(), run.trajectory)
+            write_trajectory(traj_out, run.trajectory)
     ended = perf_counter()
     report = full_report(
         run,

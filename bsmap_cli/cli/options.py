@@ -12,6 +12,7 @@ from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from bsmap_cli.config import Settings
+    from bsmap_cli.geometry.se2 import SE2
     from bsmap_cli.logs.reader import ReadOptions
 
 READING, SETTINGS, SENSOR, TALKING = "Reading the log", "Settings", "Sensor", "Messages"
@@ -48,7 +49,8 @@ TrajectoryOut = Annotated[
     option(
         "--traj",
         metavar="FILE",
-        help="Also write the trajectory (TUM: stamp x y z qx qy qz qw), one line a scan.",
+        help="Also write the trajectory, a line a scan: TUM (stamp x y z qx qy qz qw), or "
+        ".csv, .json, .kitti by extension.",
     ),
 ]
 
@@ -155,7 +157,7 @@ class ReadFlags:
         """What the reader is asked for."""
         from bsmap_cli.logs.reader import ReadOptions
 
-        pose, flipped = _laser_pose(self.laser_pose)
+        pose, flipped = parse_laser_pose(self.laser_pose)
         return ReadOptions(
             topics=tuple(self.topic or ()),
             odom=self.odom,
@@ -260,12 +262,13 @@ def numbers(name: str, text: str, count: int) -> list[float]:
     except ValueError:
         values = []
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        example = ",".join(["0.1", "30", "0"][:count])
+        example = ",".join(["0.1", "30", "0", "1"][:count])
         raise UsageError(f"{name} {text}: give {count} numbers with commas, such as {example}")
     return values
 
 
-def _laser_pose(text: str | None) -> tuple[Any, bool]:
+def parse_laser_pose(text: str | None) -> tuple[SE2 | None, bool]:
+    """The laser on the base, and whether it hangs upside down, from `x,y,yaw_deg[,flip]`."""
     from math import radians
 
     from bsmap_cli.geometry.se2 import SE2

@@ -6,12 +6,14 @@ import io
 import os
 import stat
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from secrets import token_hex
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO
 
+from bsmap_cli.cli.formats import TRAJECTORY_FORMATS
 from bsmap_cli.cli.signals import end_if_asked
 from bsmap_cli.cli.talk import is_terminal
 from bsmap_cli.errors import BsmapError, UsageError
@@ -166,16 +168,24 @@ class Output:
             pass
 
 
-def write_trajectory(stream: BinaryIO, trajectory: Trajectory) -> None:
-    """A TUM trajectory, written piece by piece: a long one is never held as text."""
-    from bsmap_cli.exchange.tum import write_tum
-    from bsmap_cli.sensor.trajectory import Trajectory
+def write_trajectory(target: Output, trajectory: Trajectory) -> None:
+    """A trajectory in the format of its extension, TUM by default."""
+    from bsmap_cli.exchange.trajectories import WRITERS
 
-    for start in range(0, len(trajectory), POSES_A_PIECE):
-        piece = slice(start, start + POSES_A_PIECE)
+    kind = TRAJECTORY_FORMATS.get(Path(target.path).suffix.lower(), "tum")
+    for piece in _pieces(trajectory) if kind in ("tum", "kitti") else [trajectory]:
         text = io.StringIO()
-        write_tum(text, Trajectory(trajectory.stamps_ns[piece], trajectory.poses[piece]))
-        stream.write(text.getvalue().encode())
+        WRITERS[kind](text, piece)
+        target.open().write(text.getvalue().encode())
+
+
+def _pieces(trajectory: Trajectory) -> Iterator[Trajectory]:
+    """A long trajectory is never held as text."""
+    for start in range(0, len(trajectory), POSES_A_PIECE):
+        rows = slice(start, start + POSES_A_PIECE)
+        yield replace(
+            trajectory, stamps_ns=trajectory.stamps_ns[rows], poses=trajectory.poses[rows]
+        )
 
 
 class _NamedFile(io.FileIO):

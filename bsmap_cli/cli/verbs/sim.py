@@ -98,7 +98,7 @@ def run(
         )
         count = write_log(log.open(), made.scans(), kind)
         if beside[0]:
-            write_trajectory(beside[0].open(), made.truth)
+            write_trajectory(beside[0], made.truth)
         if beside[1]:
             beside[1].open().write(surfaces_geojson(made.world.surfaces()).encode())
     talk.talk().note(f"{count} scans of {made.lidar.beams} beams, seed {made.seed}")

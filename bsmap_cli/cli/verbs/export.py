@@ -1,0 +1,269 @@
+"""`bsmap export`: a map in the format of another program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from bsmap_cli.cli.formats import MAP_FORMATS, MapFormat, chosen_format
+from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
+from bsmap_cli.cli.options import Force, MapIn, TalkFlags, numbers, option, parse_laser_pose
+from bsmap_cli.cli.outputs import STDOUT, Output, Outputs
+from bsmap_cli.errors import UsageError
+
+if TYPE_CHECKING:
+    from bsmap_cli.exchange.geodesy import GeoOrigin
+    from bsmap_cli.exchange.selection import Box, Selection
+    from bsmap_cli.mapping.map_document import MapDocument
+
+# which formats an option means something to
+TAKERS: dict[str, tuple[MapFormat, ...]] = {
+    "--level": ("svg", "png", "geojson", "dxf", "yaml", "csv", "ply", "mcap", "bsm"),
+    "--clip": ("svg", "png", "geojson", "dxf", "yaml", "csv", "ply", "mcap"),
+    "--traj": ("svg", "png", "dxf", "yaml", "mcap"),
+    "--resolution": ("png", "yaml"),
+    "--simplify": ("geojson", "mcap"),
+    "--origin": ("geojson",),
+    "--compress": ("bsm",),
+    "--log": ("mcap",),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartFlags:
+    """What of the map is exported, and how."""
+
+    level: Annotated[
+        float | None,
+        option("--level", metavar="STEP", help="The level of this knot step [m]."),
+    ] = None
+    clip: Annotated[
+        str | None,
+        option("--clip", metavar="X0,Y0,X1,Y1", help="Only what lies in this box [m]."),
+    ] = None
+    traj: Annotated[
+        str | None,
+        option("--traj", metavar="FILE", help="This path, not the map's thinned one."),
+    ] = None
+    resolution: Annotated[
+        float | None,
+        option("--resolution", metavar="M", min=1e-4, help="Cells of yaml and png: 0.05 m."),
+    ] = None
+    simplify: Annotated[
+        float | None,
+        option("--simplify", metavar="M", min=0.0, help="How far lines may stray from curves."),
+    ] = None
+    origin: Annotated[
+        str | None,
+        option(
+            "--origin",
+            metavar="LAT,LON,HEADING",
+            help="Where the map lies on Earth [degrees]; HEADING: of its x axis, from north.",
+        ),
+    ] = None
+    compress: Annotated[
+        bool, option("--compress", help="bsm: 3 bytes a control point, not 9 (rounds to 1 mm).")
+    ] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayFlags:
+    """The log whose scans a viewer replays along the path."""
+
+    log: Annotated[
+        str | None,
+        option("--log", metavar="LOG", help="mcap: also the scans of this log along --traj."),
+    ] = None
+    topic: Annotated[
+        list[str] | None, option("--topic", "-t", metavar="TOPIC", help="The scans of this topic.")
+    ] = None
+    laser_pose: Annotated[
+        str | None,
+        option("--laser-pose", metavar="X,Y,YAW[,flip]", help="The laser on the base [m, deg]."),
+    ] = None
+
+
+def run(
+    *,
+    talk: TalkFlags,
+    map_: MapIn = None,
+    output: Annotated[
+        str, option("--output", "-o", metavar="FILE", help="The file; `-`: standard output.")
+    ],
+    format_: Annotated[
+        str | None,
+        option("--format", metavar="NAME", help="The format, where the name does not tell."),
+    ] = None,
+    part: PartFlags,
+    replay: ReplayFlags,
+    force: Force = False,
+) -> None:
+    """Write a map in the format of another program, known from the extension of the output.
+
+    \b
+    Formats:
+      svg      Bezier curves to scale, for browsers and Inkscape
+      png      an image of occupied, free and unknown cells
+      geojson  lines in metres, or on Earth with --origin, for GIS
+      dxf      spline entities, for CAD
+      yaml     a nav2 map: the .yaml and a .pgm beside it
+      csv      control points
+      json     all of the map; `bsmap` reads it back
+      ply      samples with normals, for point cloud viewers
+      mcap     line strips, path and grid, for Foxglove; with --log and --traj a replay
+      bsm      the map file itself: one level of it, compressed, or back from json
+
+    \b
+    Example:
+      bsmap export map.bsm -o map.svg
+      bsmap export map.bsm -o map.yaml --resolution 0.1
+      bsmap export map.bsm -o - --format geojson > map.geojson
+    """
+    source = map_source(map_)
+    kind = chosen_format(output, format_, MAP_FORMATS)
+    _check_options(part, replay, kind)
+    inputs = [path for path in (source, part.traj, replay.log) if path is not None]
+    with Outputs(force=force, inputs=inputs) as outputs:
+        target = outputs.add(output, binary=kind in ("png", "ply", "mcap", "bsm"))
+        image = _image_beside(outputs, output) if kind == "yaml" else None
+        document, _ = read_map_file(source)
+        if kind == "bsm":
+            _write_bsm(target, document, part)
+        elif kind == "json":
+            from bsmap_cli.exchange.map_json import write_map_json
+
+            write_map_json(target.open(), document)
+        elif image is not None:
+            _write_nav2(target, image, _selection(document, part), part)
+        else:
+            _write_selection(target, _selection(document, part), kind, part, replay)
+
+
+def _check_options(part: PartFlags, replay: ReplayFlags, kind: MapFormat) -> None:
+    given = {
+        "--level": part.level,
+        "--clip": part.clip,
+        "--traj": part.traj,
+        "--resolution": part.resolution,
+        "--simplify": part.simplify,
+        "--origin": part.origin,
+        "--compress": part.compress or None,
+        "--log": replay.log,
+    }
+    for name, value in given.items():
+        if value is not None and kind not in TAKERS[name]:
+            raise UsageError(
+                f"{name} says nothing to {kind}: it goes with {', '.join(TAKERS[name])}"
+            )
+    if replay.log is not None and part.traj is None:
+        raise UsageError("--log replays scans along a path with stamps: give that with --traj")
+    if replay.log is None and (replay.topic or replay.laser_pose):
+        raise UsageError("--topic and --laser-pose are about the log: give that with --log")
+
+
+def _image_beside(outputs: Outputs, output: str) -> Output:
+    if output == STDOUT:
+        raise UsageError("a nav2 map is two files: name the .yaml")
+    return outputs.add(str(Path(output).with_suffix(".pgm")))
+
+
+def _selection(document: MapDocument, part: PartFlags) -> Selection:
+    from bsmap_cli.exchange.selection import select
+
+    trajectory = read_trajectory(part.traj) if part.traj is not None else None
+    return select(document, level=part.level, clip=_box(part.clip), trajectory=trajectory)
+
+
+def _box(text: str | None) -> Box | None:
+    if text is None:
+        return None
+    x0, y0, x1, y1 = numbers("--clip", text, 4)
+    if x0 >= x1 or y0 >= y1:
+        raise UsageError(f"--clip {text}: give the lower left corner, then the upper right one")
+    return x0, y0, x1, y1
+
+
+def _origin(text: str | None) -> GeoOrigin | None:
+    from bsmap_cli.exchange.geodesy import GeoOrigin
+
+    return None if text is None else GeoOrigin(*numbers("--origin", text, 3))
+
+
+def _write_bsm(target: Output, document: MapDocument, part: PartFlags) -> None:
+    from bsmap_cli.mapping.map_file import write_map
+
+    if part.level is not None:
+        document = replace(document, levels=document.chosen_levels(part.level), parts=False)
+    write_map(target.open(), document, compress=part.compress)
+
+
+def _write_nav2(target: Output, image: Output, selection: Selection, part: PartFlags) -> None:
+    from bsmap_cli.exchange.nav2 import (
+        RESOLUTION_M,
+        selected_occupancy,
+        write_nav2_yaml,
+        write_pgm,
+    )
+
+    grid = selected_occupancy(selection, resolution_m=part.resolution or RESOLUTION_M)
+    write_pgm(image.open(), grid)
+    write_nav2_yaml(target.open(), grid, Path(image.path).name)
+
+
+def _write_selection(
+    target: Output, selection: Selection, kind: MapFormat, part: PartFlags, replay: ReplayFlags
+) -> None:
+    from bsmap_cli.exchange.flatten import TOLERANCE_M
+
+    tolerance_m = TOLERANCE_M if part.simplify is None else part.simplify
+    stream = target.open()
+    if kind == "svg":
+        from bsmap_cli.exchange.svg import write_svg
+
+        write_svg(stream, selection)
+    elif kind == "geojson":
+        from bsmap_cli.exchange.geojson import write_geojson
+
+        origin = _origin(part.origin)
+        write_geojson(stream, selection, origin=origin, tolerance_m=tolerance_m)
+    elif kind == "dxf":
+        from bsmap_cli.exchange.dxf import write_dxf
+
+        write_dxf(stream, selection)
+    elif kind == "csv":
+        from bsmap_cli.exchange.control_points import write_control_points
+
+        write_control_points(stream, selection)
+    elif kind == "ply":
+        from bsmap_cli.exchange.ply import write_ply
+
+        write_ply(stream, selection)
+    elif kind == "png":
+        from bsmap_cli.evaluation.occupancy import trinary_png
+        from bsmap_cli.exchange.nav2 import RESOLUTION_M, selected_occupancy
+
+        grid = selected_occupancy(selection, resolution_m=part.resolution or RESOLUTION_M)
+        stream.write(trinary_png(grid.cells))
+    else:
+        _write_mcap(target, selection, tolerance_m, replay)
+
+
+def _write_mcap(
+    target: Output, selection: Selection, tolerance_m: float, replay: ReplayFlags
+) -> None:
+    from bsmap_cli.exchange.viewer_mcap import write_viewer_mcap
+
+    if replay.log is None:
+        write_viewer_mcap(target.open(), selection, tolerance_m=tolerance_m)
+        return
+    from bsmap_cli.logs.open_log import open_log
+    from bsmap_cli.logs.reader import ReadOptions
+
+    pose, flipped = parse_laser_pose(replay.laser_pose)
+    options = ReadOptions(
+        topics=tuple(replay.topic or ()), pose_base_laser=pose, laser_flipped=flipped
+    )
+    with open_log([replay.log], options) as reader:
+        scans = reader.scans()
+        write_viewer_mcap(target.open(), selection, scans=scans, tolerance_m=tolerance_m)
