@@ -67,11 +67,13 @@ def _descend(
     height: int,
     dx: int,
     dy: int,
+    reach: int,
     best: float,
     barred: Vector,
 ) -> tuple[float, int, int]:
     """Best translation inside one block of 2^height cells, if it beats `best`.
 
+    reach : translations beyond it lie outside the window, whatever the block.
     barred : dx, dy and radius [cells] of a disc that does not count.
     """
     stack = np.empty((4 * (height + 1) + 4, 3), np.int64)
@@ -101,7 +103,7 @@ def _descend(
             children[k, 1] = y + half * (k >> 1)
             scores[k] = _score(grids, h - 1, cells, children[k, 0], children[k, 1])
         for k in np.argsort(scores):  # best child last, so that it is opened first
-            if scores[k] > best:
+            if scores[k] > best and max(children[k, 0], children[k, 1]) <= reach:
                 stack[depth, 0] = h - 1
                 stack[depth, 1] = children[k, 0]
                 stack[depth, 2] = children[k, 1]
@@ -147,6 +149,7 @@ def _search(
                 top,
                 (k % blocks) * block - reach,
                 (k // blocks) * block - reach,
+                reach,
                 best,
                 barred[a],
             )
@@ -200,7 +203,8 @@ def search(
     discs = np.zeros((len(angles), 3))
     if barred is not None:
         discs[:, :2] = (barred.pose[:2] - centre[:2]) / cell_m
-        discs[np.abs(angles - barred.pose[2]) < apart_rad, 2] = apart_m / cell_m
+        turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
+        discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
     results = np.empty((len(angles), 4))
     count = _search(
         likelihood.grids,
