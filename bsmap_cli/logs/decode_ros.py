@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bsmap_cli.logs.byte_streams import ZSTD_MAGIC, DamagedBytesError
 from bsmap_cli.logs.canonical import float32_ranges, yaw_of_quaternion
+from bsmap_cli.logs.chunks import CHUNK_LIMIT_BYTES, unpack_chunk
 from bsmap_cli.logs.decode_known import (
     LASER_SCAN_TYPES,
     ODOMETRY_TYPES,
@@ -40,7 +42,24 @@ _IDL_SEPARATOR = "=" * 80 + "\n"
 
 
 def ros_decoder(channel: Channel, *, last_echo: bool) -> Decoder:
-    """A decoder for a channel of one of the types of `_RECORDS`."""
+    """A decoder for a channel of one of the types of `_RECORDS`.
+
+    Messages that ROS 2 has packed one by one are unpacked: no CDR begins like a `.zst`.
+    """
+    decode = _plain_decoder(channel, last_echo=last_echo)
+
+    def decode_packed(payload: bytes | memoryview) -> Record:
+        if payload[:4] != ZSTD_MAGIC:
+            return decode(payload)
+        try:
+            return decode(unpack_chunk(bytes(payload), "zstd", CHUNK_LIMIT_BYTES, is_cut=False))
+        except DamagedBytesError as error:
+            raise BadMessageError(str(error)) from error
+
+    return decode_packed
+
+
+def _plain_decoder(channel: Channel, *, last_echo: bool) -> Decoder:
     typestore = _typestore_for(channel)
     is_ros1 = channel.encoding == "ros1"
     if channel.type == LASER_SCAN_TYPES[0] and _is_usual(typestore, LASER_SCAN_TYPES, is_ros1):

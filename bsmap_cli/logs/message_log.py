@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from itertools import chain
 
 from bsmap_cli.logs.decoding import Decoder, Kind, decoder_for, kind_of
+from bsmap_cli.logs.drawn_log import DrawnLog
 from bsmap_cli.logs.message_info import LogSurvey, indexed_channels
 from bsmap_cli.logs.messages import BadMessageError, Channel, Container, RawMessage
 from bsmap_cli.logs.mountings import Mountings
 from bsmap_cli.logs.preview import Event, Preview
-from bsmap_cli.logs.reader import LogInfo, LogReader, ReadOptions, ReadReport
+from bsmap_cli.logs.reader import LogInfo, ReadOptions
 from bsmap_cli.logs.scan_stream import ScanStream
+from bsmap_cli.logs.sources import Source
 from bsmap_cli.sensor.scan import Scan
 
 
-class MessageLog:
+class MessageLog(DrawnLog):
     """Streams the scans of containers that are the parts of one run; see `LogReader`."""
 
-    def __init__(self, name: str, containers: list[Container], options: ReadOptions) -> None:
-        self.report = ReadReport()
+    def __init__(
+        self,
+        name: str,
+        sources: Sequence[Source],
+        containers: list[Container],
+        options: ReadOptions,
+    ) -> None:
+        super().__init__(sources)
         self._containers = containers
         self._options = options
         self._preview = Preview(name, options)
         self._decoders: dict[Channel, tuple[Kind, Decoder]] = {}
         self._needed: frozenset[str | None] | None = None
-        self._drawn: Generator[Scan, None, None] | None = None
-
-    def __enter__(self) -> LogReader:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        if self._drawn is not None:
-            self._drawn.close()
-
-    def scans(self) -> Iterator[Scan]:
-        """See `LogReader.scans`."""
-        self._drawn = self._scans()
-        return self._drawn
 
     def info(self) -> LogInfo:
         """See `LogReader.info`; with an index only the first seconds are read."""
@@ -53,7 +48,7 @@ class MessageLog:
                     is_judged = self._preview.add(self._decoded(channel, log_time_ns, payload))
         return survey.info()
 
-    def _scans(self) -> Generator[Scan, None, None]:
+    def _draw(self) -> Generator[Scan, None, None]:
         preview = self._preview
         preview.indexed = indexed_channels(self._containers)
         with closing(self._events()) as events:

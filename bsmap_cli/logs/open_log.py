@@ -35,18 +35,28 @@ def open_log(sources: Sequence[str | Path | BinaryIO], options: ReadOptions) -> 
     Raises LogError for what is not there, is empty, or is no log; UsageError for options that do
     not go with the format. Nothing but the beginnings is read before `scans` or `info`.
     """
-    known = [(source, kind) for source in expand(sources) if (kind := _kind_of(source))]
-    names = [str(source) for source in sources]
+    named = expand(sources)
+    try:
+        return _reader([str(source) for source in sources], named, options)
+    except BaseException:
+        for source in named:
+            source.close()
+        raise
+
+
+def _reader(names: list[str], sources: list[Source], options: ReadOptions) -> LogReader:
+    known = [(source, kind) for source in sources if (kind := _kind_of(source))]
     if not known:
         raise LogError(f"{', '.join(names)} holds no log: {_KNOWN}")
     parts = [source for source, _ in known]
     name = parts[0].name if len(parts) == 1 else f"{Path(names[0]).name} ({len(parts)} files)"
     kinds = {kind for _, kind in known}
     if kinds <= set(_CONTAINERS):
-        return MessageLog(name, [_CONTAINERS[kind](source) for source, kind in known], options)
+        containers = [_CONTAINERS[kind](source) for source, kind in known]
+        return MessageLog(name, parts, containers, options)
     if len(kinds) > 1:
         raise LogError(f"{name} are of different formats ({', '.join(sorted(kinds))}): name one")
-    return TextLog(name, _PARSERS[kinds.pop()](name, parts, options), options)
+    return TextLog(name, parts, _PARSERS[kinds.pop()](name, parts, options), options)
 
 
 _CONTAINERS: dict[str, Callable[[Source], Container]] = {

@@ -9,6 +9,9 @@ from typing import Protocol
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.scan import Scan
 
+WARNINGS_LIMIT = 50
+"""A log that is wrong in ever new ways must not fill the screen."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadOptions:
@@ -53,7 +56,7 @@ class ReadReport:
 
     def warn(self, line: str) -> None:
         """Tell the user once."""
-        if line not in self.warnings:
+        if line not in self.warnings and len(self.warnings) < WARNINGS_LIMIT:
             self.warnings.append(line)
 
     def lose(self, line: str) -> None:

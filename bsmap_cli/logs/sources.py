@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from bsmap_cli.errors import LogError
+from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.logs.byte_streams import is_packed, put_back, unpack
 
 STDIN = "-"
@@ -24,12 +24,14 @@ class Source:
     name : for messages to the user.
     path : the file, or None for a stream.
     found : whether the source was come upon in a folder rather than named by the user.
+    ours : the stream below `stream` that was opened here, to be closed here.
     """
 
     name: str
     path: Path | None = None
     stream: BinaryIO | None = None
     found: bool = False
+    ours: BinaryIO | None = None
     _front: bytes = b""
 
     @contextmanager
@@ -50,6 +52,11 @@ class Source:
         with open_file(self.path) as file:
             return None if is_packed(file.read(4)) else self.path
 
+    def close(self) -> None:
+        """Close a stream that was opened here."""
+        if self.ours is not None:
+            self.ours.close()
+
     def keep(self, front: bytes, rest: BinaryIO) -> None:
         """Remember bytes that were read from a stream to look at them."""
         if self.path is None:
@@ -59,12 +66,15 @@ class Source:
 @contextmanager
 def open_file(path: Path) -> Iterator[BinaryIO]:
     """The file, closed behind the block; raises LogError where it cannot be opened."""
+    with _opened(path) as file:
+        yield file
+
+
+def _opened(path: Path) -> BinaryIO:
     try:
-        file = path.open("rb")
+        return path.open("rb")
     except OSError as error:
         raise LogError(f"cannot open {path}: {error.strerror or error}") from error
-    with file:
-        yield file
 
 
 def natural_key(text: str) -> list[tuple[int, int, str]]:
@@ -81,7 +91,9 @@ def expand(sources: Sequence[str | Path | BinaryIO]) -> list[Source]:
     named = [_as_source(source) for source in sources]
     if any(source.path is None for source in named):
         if len(named) > 1:
-            raise LogError("standard input cannot be joined with other logs: give one or the other")
+            for source in named:
+                source.close()
+            raise UsageError("a stream cannot be joined with other logs: give one or the other")
         return named
     named.sort(key=lambda source: natural_key(str(source.path)))
     return [part for source in named for part in _parts(source)]
@@ -91,7 +103,11 @@ def _as_source(source: str | Path | BinaryIO) -> Source:
     if source == STDIN:
         return Source(name="standard input", stream=sys.stdin.buffer)
     if isinstance(source, str | Path):
-        return Source(name=Path(source).name or str(source), path=Path(source))
+        path = Path(source)
+        if path.is_fifo() or path.is_char_device():  # it can be opened once only
+            stream = _opened(path)
+            return Source(name=str(path), stream=stream, ours=stream)
+        return Source(name=path.name or str(path), path=path)
     return Source(name=str(getattr(source, "name", "stream")), stream=source)
 
 

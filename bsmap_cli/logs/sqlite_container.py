@@ -10,8 +10,7 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from bsmap_cli.logs.byte_streams import ZSTD_MAGIC, DamagedBytesError
-from bsmap_cli.logs.chunks import CHUNK_LIMIT_BYTES, unpack_chunk
+from bsmap_cli.logs.byte_streams import DamagedBytesError
 from bsmap_cli.logs.messages import Channel, ContainerIndex, RawMessage, normal_type
 from bsmap_cli.logs.reader import ReadReport
 from bsmap_cli.logs.sources import Source
@@ -68,7 +67,7 @@ class SqliteContainer:
                 )
                 for topic, log_time_ns, data in rows:
                     if isinstance(data, bytes) and isinstance(log_time_ns, int):
-                        yield wanted[topic], log_time_ns, _unpacked(data)
+                        yield wanted[topic], log_time_ns, data
                 if self._is_cut:
                     raise DamagedBytesError("the file is cut off")
         except (sqlite3.Error, DamagedBytesError, OSError) as error:
@@ -141,9 +140,3 @@ def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
             schema=text.encode("utf-8", "replace"),
         )
     return channels
-
-
-def _unpacked(data: bytes) -> bytes:
-    if not data.startswith(ZSTD_MAGIC):  # no CDR message starts like this
-        return data
-    return unpack_chunk(data, "zstd", CHUNK_LIMIT_BYTES, is_cut=False)

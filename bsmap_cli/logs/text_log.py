@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from decimal import Decimal
 from typing import NamedTuple, Protocol
 
 from bsmap_cli.errors import UsageError
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.byte_streams import DamagedBytesError
+from bsmap_cli.logs.drawn_log import DrawnLog
 from bsmap_cli.logs.laser import scan_of
 from bsmap_cli.logs.messages import SECOND_NS, BadMessageError, LaserRecord
-from bsmap_cli.logs.reader import LogInfo, LogReader, ReadOptions, ReadReport, TopicInfo
+from bsmap_cli.logs.reader import LogInfo, ReadOptions, ReadReport, TopicInfo
 from bsmap_cli.logs.sources import Source
 from bsmap_cli.logs.window import ScanWindow, Verdict
 from bsmap_cli.sensor.scan import Scan
@@ -43,34 +44,23 @@ class TextParser(Protocol):
         ...
 
 
-class TextLog:
+class TextLog(DrawnLog):
     """Streams the scans of a parser; see `LogReader`."""
 
-    def __init__(self, name: str, parser: TextParser, options: ReadOptions) -> None:
+    def __init__(
+        self, name: str, sources: Sequence[Source], parser: TextParser, options: ReadOptions
+    ) -> None:
+        super().__init__(sources)
         if options.odom not in ("auto", "none"):
             raise UsageError(
                 f"{name} is a {parser.format} log, its poses stand beside its scans:"
                 " --odom is auto or none"
             )
-        self.report = ReadReport()
         self._name = name
         self._parser = parser
         self._options = options
-        self._drawn: Generator[Scan, None, None] | None = None
 
-    def __enter__(self) -> LogReader:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        if self._drawn is not None:
-            self._drawn.close()
-
-    def scans(self) -> Iterator[Scan]:
-        """See `LogReader.scans`."""
-        self._drawn = self._scans()
-        return self._drawn
-
-    def _scans(self) -> Generator[Scan, None, None]:
+    def _draw(self) -> Generator[Scan, None, None]:
         window = ScanWindow(self._options)
         for line in self._parser.scans(self.report):
             if isinstance(line, BadMessageError):

@@ -165,3 +165,37 @@ def test_an_unclosed_bag_is_read(tmp_path):
     found, report = read(path)
     assert report.truncated
     assert len(found) > 190
+
+
+def test_a_named_pipe_is_read_once(tmp_path):
+    """`bsmap slam <(zcat log.clf.gz)` names a file that cannot be opened twice."""
+    import os
+    import threading
+
+    data = MAKERS["carmen.gz"](tmp_path / "log", SCANS).read_bytes()
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(data,))
+    writer.start()
+    found, _ = read(pipe)
+    writer.join()
+    assert_same(found, SCANS)
+
+
+def test_memory_does_not_grow_with_the_log(tmp_path):
+    import tracemalloc
+
+    for kind in ("mcap zstd", "bag", "lone db3", "csv.gz", "carmen flaser"):
+        folder = tmp_path / kind
+        folder.mkdir()
+        path = MAKERS[kind](folder / "log", some_scans(3000, 181))
+        with open_log([path], ReadOptions()) as reader:
+            scans = reader.scans()
+            for _ in range(500):
+                next(scans)
+            tracemalloc.start()
+            count = sum(1 for _ in scans)
+            peak = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+        assert count == 2500
+        assert peak < 1.5e6, kind
