@@ -7,6 +7,7 @@ everything else goes through a `rosbags` typestore.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -99,6 +100,7 @@ def _typestore_for(channel: Channel) -> Typestore:
     return typestore if text.strip() else usual
 
 
+@cache
 def _usual_typestore(is_ros1: bool) -> Typestore:
     from rosbags.typesys import Stores, get_typestore
 
