@@ -11,7 +11,7 @@ from bsmap_cli.geometry.se2 import Points
 DRIFT_SHARE = 0.01  # of the way travelled: what registration against a fresh map loses
 DRIFT_RAD_PER_STEP = 0.0001  # turn lost per finest knot step of way
 WEAK_STEPS, WEAK_RAD = 10.0, 0.35  # a lost stretch: finest knot steps, radians
-FLOOR_STEPS, FLOOR_RAD = 0.2, 0.003  # what no registration goes below
+FLOOR_STEPS, FLOOR_RAD = 0.4, 0.006  # what no registration goes below: the bends of a submap
 
 
 def match_information(hessian: Points, knot_step_m: float, *, frame_rad: float) -> Points:
