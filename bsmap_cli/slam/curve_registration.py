@@ -1,8 +1,10 @@
 """Registration as the paper prints it: a pose and an offset for each curve, then one pose of all.
 
 Sec. IV solves a 4 x 4 Gauss-Newton system for every tracked curve and leaves open how the poses
-that come out are joined. Here they are averaged, each with the length over which its curve
-overlaps the map.
+that come out are joined. Here each counts with the inverse of its covariance, as least squares
+estimates that from the curve's own residuals: a straight wall then says nothing about the way
+along it, and a curve tracked wrongly, which never fits, next to nothing at all. A plain mean, also
+one weighted with the curves' lengths, loses the robot even where ranges are exact.
 """
 
 from __future__ import annotations
@@ -15,12 +17,16 @@ from bsmap_cli.slam.curve_equations import CurveEquations, PairSystem
 
 SINGULAR = 1e-6  # smaller eigenvalue ratios leave a direction where it was: a straight wall, an arc
 STILL = 1e-4  # a smaller step ends the iteration of a curve [knot steps]
+EXACT = 1e-3  # residuals count as at least this [knot steps]: no fit is better than its lattice
 
 
 def register_curves(
     system: PairSystem, start_pose: Vector, iterations: int
 ) -> tuple[Vector, int, NDArray[np.bool_]]:
-    """Joined pose (3,), steps taken, and which pairs had a say; `system.offsets` are updated."""
+    """Joined pose (3,), steps taken, and which pairs had a say; `system.offsets` are updated.
+
+    A curve that has not come to rest after `iterations` steps, or has left the map curve, has none.
+    """
     step_m = system.curve_map.knot_step_m
     poses = np.tile(start_pose, (len(system.offsets), 1))
     moving = np.ones(len(poses), bool)
@@ -30,14 +36,13 @@ def register_curves(
         delta = curve_steps(equations, step_m)
         delta[~moving] = 0.0
         poses += delta[:, :3]
-        system.offsets -= delta[:, 3]
-        lever = np.sqrt(equations.levers / np.maximum(equations.weights, 1e-300))
-        size = np.hypot(delta[:, 0], delta[:, 1]) + lever * np.abs(delta[:, 2])
+        system.offsets -= delta[:, 3]  # an argument shift: the paper's sign runs away
+        size = np.hypot(delta[:, 0], delta[:, 1]) + _levers(equations) * np.abs(delta[:, 2])
         moving &= size + step_m * np.abs(delta[:, 3]) > STILL * step_m
         equations = system.linearise(poses)
         steps += 1
-    used = equations.overlaps > 0.0
-    return _joined(start_pose, poses[used], equations.overlaps[used]), steps, used
+    used = (equations.overlaps > 0.0) & ~moving
+    return join_poses(start_pose, poses, equations, used, step_m), steps, used
 
 
 def curve_steps(equations: CurveEquations, step_m: float) -> Points:
@@ -45,21 +50,52 @@ def curve_steps(equations: CurveEquations, step_m: float) -> Points:
 
     The norm is in metres: angles count with the lever arm of the curve, u with the knot step.
     """
-    lever = np.sqrt(equations.levers / np.maximum(equations.weights, 1e-300))
+    lever = np.maximum(_levers(equations), 1e-9)
     ones = np.ones(len(lever))
-    scale = np.stack((ones, ones, np.maximum(lever, 1e-9), step_m * ones), axis=1)
+    scale = np.stack((ones, ones, lever, step_m * ones), axis=1)
     hessians = equations.hessians / (scale[:, :, None] * scale[:, None, :])
-    values, vectors = np.linalg.eigh(hessians)
-    seen = values > SINGULAR * values[:, -1:]
-    along = np.einsum("pik,pi->pk", vectors, equations.gradients / scale)
-    along = np.where(seen, along / np.where(seen, values, 1.0), 0.0)
-    steps: Points = np.einsum("pik,pk->pi", vectors, along) / scale
+    steps: Points = _least_norm(hessians, equations.gradients / scale) / scale
     return steps
 
 
-def _joined(start_pose: Vector, poses: Points, lengths: Vector) -> Vector:
-    """Mean pose, weighted with the lengths; the start where no curve says anything."""
-    if not len(poses):
+def join_poses(
+    start_pose: Vector,
+    poses: Points,
+    equations: CurveEquations,
+    used: NDArray[np.bool_],
+    step_m: float,
+) -> Vector:
+    """One pose (3,): sum(S_i / s_i^2) dxi = sum(S_i / s_i^2 dxi_i) over the `used` pairs.
+
+    S_i is the pair's information with its offset eliminated, s_i^2 its mean square residual. The
+    start is kept where no curve says anything.
+    """
+    if not np.any(used):
         return start_pose.copy()
-    joined: Vector = start_pose + lengths @ (poses - start_pose) / lengths.sum()
+    hessians, weights = equations.hessians[used], equations.weights[used]
+    b, d = hessians[:, :3, 3], hessians[:, 3, 3]
+    information = hessians[:, :3, :3] - b[:, :, None] * b[:, None, :] / d[:, None, None]
+    variances = equations.squares[used] / weights + (EXACT * step_m) ** 2
+    information /= variances[:, None, None]
+    right = np.einsum("pij,pj->i", information, poses[used] - start_pose)
+    lever = np.sqrt(equations.levers[used].sum() / weights.sum())
+    scale = np.array([1.0, 1.0, max(lever, 1e-9)])
+    total = information.sum(axis=0) / np.outer(scale, scale)
+    joined: Vector = start_pose + _least_norm(total[None], (right / scale)[None])[0] / scale
     return joined
+
+
+def _levers(equations: CurveEquations) -> Vector:
+    """(P,) root mean square distance of each scan curve from the body [m]."""
+    levers: Vector = np.sqrt(equations.levers / np.maximum(equations.weights, 1e-300))
+    return levers
+
+
+def _least_norm(matrices: Vector, right: Points) -> Points:
+    """(P, n) solutions of symmetric systems; nothing along directions that are singular."""
+    values, vectors = np.linalg.eigh(matrices)
+    seen = values > SINGULAR * values[:, -1:]
+    along = np.einsum("pik,pi->pk", vectors, right)
+    along = np.where(seen, along / np.where(seen, values, 1.0), 0.0)
+    solution: Points = np.einsum("pik,pk->pi", vectors, along)
+    return solution
