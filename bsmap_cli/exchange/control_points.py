@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-import numpy as np
-
-from bsmap_cli.exchange.selection import Selection
+from bsmap_cli.exchange.selection import Selection, selected_document
 
 COLUMNS = (
     *("knot_step_m", "degree", "curve_id", "tau_start_m", "tau_end_m", "flags", "observations"),
@@ -22,14 +20,9 @@ def write_control_points(stream: BinaryIO, selection: Selection) -> None:
     out whole curves only, those of which nothing lies within.
     """
     stream.write(f"{','.join(COLUMNS)}\n".encode())
-    for selected in selection.levels:
-        level = selected.level
-        kept = np.ones(len(level), bool)
-        if selection.clip is not None:
-            kept[:] = False
-            kept[selected.pieces.curve] = True
+    for level in selected_document(selection).levels:
         rows = level.offsets()
-        for curve in np.flatnonzero(kept).tolist():
+        for curve in range(len(level)):
             head = (
                 f"{level.knot_step_m!r},{level.degree},{level.curve_ids[curve]},"
                 f"{level.tau_start_m[curve]!s},{level.tau_end_m[curve]!s},"

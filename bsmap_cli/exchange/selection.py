@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,34 @@ def select(
     if trajectory is not None:
         path, stamps_ns = trajectory.poses, trajectory.stamps_ns
     return Selection(document, tuple(levels), path, stamps_ns, clip)
+
+
+def selected_document(selection: Selection) -> MapDocument:
+    """The map of the selected levels; of clipped ones the whole curves that reach into the box."""
+    levels = []
+    for selected in selection.levels:
+        kept = np.ones(len(selected.level), bool)
+        if selection.clip is not None:
+            kept[:] = False
+            kept[selected.pieces.curve] = True
+        levels.append(_with_curves(selected.level, kept))
+    return replace(selection.document, levels=tuple(levels))
+
+
+def _with_curves(level: MapLevel, kept: NDArray[np.bool_]) -> MapLevel:
+    points = np.repeat(kept, level.point_counts)
+    return replace(
+        level,
+        curve_ids=level.curve_ids[kept],
+        tau_start_m=level.tau_start_m[kept],
+        tau_end_m=level.tau_end_m[kept],
+        flags=level.flags[kept],
+        observations=level.observations[kept],
+        first_indices=level.first_indices[kept],
+        point_counts=level.point_counts[kept],
+        control_points=level.control_points[points],
+        weights=level.weights[points],
+    )
 
 
 def clipped(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:

@@ -44,6 +44,7 @@ def plot_map(
     reference: Trajectory | None = None,
     overlay: MapDocument | None = None,
     level: float | None = None,
+    clip: Bounds | None = None,
     colour_by: str = "weight",
     dark: bool = False,
     control_points: bool = False,
@@ -55,6 +56,7 @@ def plot_map(
     reference : drawn aligned to the trajectory, which is then coloured by its distance from it.
     overlay : a second map in another colour; both are then drawn plain.
     level : knot step [m] to draw; otherwise the finest, or all that are parts of one map.
+    clip : show only this box x0, y0, x1, y1 [m].
     colour_by : "weight" (observations), "curve", or "level" (all levels).
     control_points, knots : mark them.
 
@@ -65,8 +67,7 @@ def plot_map(
     levels = document.levels if every_level else document.chosen_levels(level)
     path = document.path[:, :2].astype(float) if trajectory is None else trajectory.poses[:, :2]
     clouds = [sample_level(each, each.knot_step_m).points for each in levels]
-    bounds = _bounds([*clouds, path])
-    sheet = map_sheet(bounds, theme)
+    sheet = map_sheet(clip or _bounds([*clouds, path]), theme)
     axes = sheet.axes
     if overlay is not None:
         for each in overlay.chosen_levels(level):
