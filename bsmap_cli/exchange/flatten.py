@@ -10,11 +10,13 @@ from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.sampling import evaluate
 
 TOLERANCE_M = 0.001
+LEAST_TOLERANCE_M = 1e-6  # what is written is rounded to no less
 
 
 def polylines(selected: SelectedLevel, tolerance_m: float = TOLERANCE_M) -> list[Points]:
     """One polyline for each piece, as few vertices as keep it within `tolerance_m` of the curve."""
     level, pieces = selected.level, selected.pieces
+    tolerance_m = max(tolerance_m, LEAST_TOLERANCE_M)
     begin, piece = _intervals(selected, 0.5 * tolerance_m)
     points, _ = evaluate(level, pieces.curve[piece], begin)
     last, _ = evaluate(level, pieces.curve, pieces.end)
