@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from decimal import Decimal
 from typing import NamedTuple, Protocol
 
 from bsmap_cli.errors import UsageError
@@ -16,9 +15,9 @@ from bsmap_cli.logs.reader import LogInfo, ReadOptions, ReadReport, TopicInfo
 from bsmap_cli.logs.sources import Source
 from bsmap_cli.logs.window import ScanWindow, Verdict
 from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.stamps import parse_stamp
 
 LINE_LIMIT_BYTES = 1 << 24
-_STAMP_LIMIT = Decimal(2**63) / SECOND_NS
 
 
 class TextScan(NamedTuple):
@@ -172,9 +171,6 @@ def stamp_ns_of(text: bytes) -> int:
     if whole.isdigit() and fraction.isdigit() and len(whole) <= 10 and len(fraction) <= 9:
         return int(whole) * SECOND_NS + int(fraction.ljust(9, b"0"))
     try:
-        seconds = Decimal(text.decode("ascii"))
-        if seconds.is_finite() and abs(seconds) < _STAMP_LIMIT:
-            return int((seconds * SECOND_NS).to_integral_value())
-    except (ArithmeticError, UnicodeDecodeError):
-        pass
-    raise BadMessageError("a stamp that is no number of seconds")
+        return parse_stamp(text.decode("ascii"))
+    except ValueError as error:
+        raise BadMessageError("a stamp that is no number of seconds") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 
 LARGEST_NS = 2**63 - 1
 
@@ -20,5 +20,5 @@ def parse_stamp(text: str) -> int:
         if abs(value) > LARGEST_NS:
             raise ValueError(f"{text} s does not fit 64 bits of nanoseconds")
         return int(value)
-    except (InvalidOperation, OverflowError) as error:
+    except ArithmeticError as error:
         raise ValueError(f"{text!r} is not a time in seconds") from error
