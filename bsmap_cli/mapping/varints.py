@@ -13,15 +13,18 @@ LONGEST = 10  # bytes that 64 bits can take
 def encode_varints(values: NDArray[np.uint64]) -> bytes:
     """LEB128: seven bits a byte, lowest first, the top bit set on all bytes but the last."""
     lengths = np.ones(len(values), np.int64)
-    for shift in range(7, 64, 7):
-        lengths += values >= np.uint64(1 << shift)
+    rows = np.flatnonzero(values > 0x7F)
+    longer = [rows]  # the values of more than one byte, more than two, ...
+    while len(rows):
+        lengths[rows] += 1
+        rows = rows[values[rows] >> np.uint64(7 * len(longer)) > 0x7F]
+        longer.append(rows)
     starts = np.cumsum(lengths) - lengths
     data = np.zeros(int(lengths.sum()), np.uint8)
-    for k in range(int(lengths.max(initial=0))):
-        rows = np.flatnonzero(lengths > k)
-        piece = (values[rows] >> np.uint64(7 * k)) & np.uint64(0x7F)
-        more = (lengths[rows] > k + 1) * np.uint64(0x80)
-        data[starts[rows] + k] = (piece | more).astype(np.uint8)
+    data[starts] = values & np.uint64(0x7F)
+    for k, rows in enumerate(longer[:-1], 1):
+        data[starts[rows] + k - 1] |= np.uint8(0x80)
+        data[starts[rows] + k] = (values[rows] >> np.uint64(7 * k)) & np.uint64(0x7F)
     return data.tobytes()
 
 
@@ -31,15 +34,17 @@ def decode_varints(data: bytes, count: int) -> NDArray[np.uint64]:
     ends = np.flatnonzero(stream < 0x80)
     if len(ends) != count or (len(stream) > 0 and stream[-1] >= 0x80):
         raise ValueError(f"{count} varints, found {len(ends)} in {len(stream)} bytes")
-    starts = np.concatenate(([0], ends[:-1] + 1)) if count else ends
-    lengths = ends - starts + 1
-    if lengths.max(initial=0) > LONGEST:
-        raise ValueError(f"varints of at most {LONGEST} bytes")
-    values = np.zeros(count, np.uint64)
-    for k in range(int(lengths.max(initial=0))):
-        rows = np.flatnonzero(lengths > k)
+    starts = np.zeros(count, np.int64)
+    starts[1:] = ends[:-1] + 1
+    values = (stream[starts] & np.uint8(0x7F)).astype(np.uint64)
+    rows, k = np.flatnonzero(ends > starts), 1
+    while len(rows):
+        if k == LONGEST:
+            raise ValueError(f"varints of at most {LONGEST} bytes, found a longer one")
         piece = (stream[starts[rows] + k] & np.uint8(0x7F)).astype(np.uint64)
         values[rows] |= piece << np.uint64(7 * k)
+        k += 1
+        rows = rows[ends[rows] - starts[rows] >= k]
     return values
 
 
