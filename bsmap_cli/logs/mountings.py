@@ -59,6 +59,7 @@ class Mountings:
         matrix = None if base is None else self._tree.matrix(base, frame)
         if base is None or matrix is None:
             if not is_posed:
+                self._report.places_unknown = True
                 self._report.warn(_taken_as_base(frame, base))
             return np.eye(4)
         if self._tree.moves(base, frame):

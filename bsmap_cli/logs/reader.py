@@ -45,6 +45,9 @@ class ReadReport:
     scans_skipped : scans, of the chosen topics, that could not be read.
     truncated : part of the log is missing or damaged.
     odometry : what moves the base, in a few words.
+    places_unknown : whether the place of a laser was neither in the log nor told.
+    recorded_after_s : least and greatest time of recording minus stamp [s], where the log has
+        both.
     warnings : one line each, for the user, without repetition.
     """
 
@@ -52,6 +55,8 @@ class ReadReport:
     scans_skipped: int = 0
     truncated: bool = False
     odometry: str = "none"
+    places_unknown: bool = False
+    recorded_after_s: tuple[float, float] | None = None
     warnings: list[str] = field(default_factory=list)
 
     def warn(self, line: str) -> None:

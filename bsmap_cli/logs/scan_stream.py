@@ -74,6 +74,7 @@ class ScanStream:
         self._lasers: dict[tuple[str, str], _Laser] = {}
         self._waiting: deque[_Waiting] = deque()
         self._told: set[str] = set()
+        self._delays_ns: tuple[int, int] | None = None
 
     def scans(self, events: Iterable[Event]) -> Iterator[Scan]:
         """The scans of the chosen topics; bad ones are counted and passed over."""
@@ -100,6 +101,8 @@ class ScanStream:
             how = "are zero" if stamp_ns == 0 else "stand still"
             self._report.warn(f"stamps of {topic} {how}: the time of recording is used")
             stamp_ns = log_time_ns
+        else:
+            self._note_delay(log_time_ns - stamp_ns)
         verdict = self._window.judge(stamp_ns, topic)
         if verdict is not Verdict.TAKE:
             return verdict is Verdict.SKIP
@@ -114,6 +117,13 @@ class ScanStream:
         pushed = self._motion.buffer.pushed if self._motion.buffer else 0
         self._waiting.append(_Waiting(record, laser, stamp_ns, log_time_ns, pushed))
         return True
+
+    def _note_delay(self, delay_ns: int) -> None:
+        low_ns, high_ns = self._delays_ns or (delay_ns, delay_ns)
+        if self._delays_ns is None or not low_ns <= delay_ns <= high_ns:
+            low_ns, high_ns = min(low_ns, delay_ns), max(high_ns, delay_ns)
+            self._delays_ns = low_ns, high_ns
+            self._report.recorded_after_s = low_ns / SECOND_NS, high_ns / SECOND_NS
 
     def _settled(self, log_time_ns: int | None) -> Iterator[Scan]:
         """The scans that need not wait any longer; all of them at the end of the log (None)."""

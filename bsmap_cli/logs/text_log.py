@@ -125,6 +125,7 @@ class TextLog(DrawnLog):
         options = self._options
         pose_base_laser = options.pose_base_laser or line.pose_base_laser
         if pose_base_laser is None:
+            self.report.places_unknown = True
             self.report.warn(
                 "the log does not tell where the laser sits: it is taken to be the base"
                 " (tell its place with --laser-pose x,y,yaw_deg)"
