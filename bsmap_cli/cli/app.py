@@ -13,7 +13,10 @@ from bsmap_cli import __version__
 from bsmap_cli.cli.command import command
 from bsmap_cli.cli.help import GroupedCommand
 
-VERBS = ("slam", "map", "stats", "info", "eval", "export", "plot", "sim", "scans", "config")
+VERBS = (
+    *("slam", "map", "stats", "info", "check", "eval", "export", "plot", "view", "sim", "scans"),
+    "config",
+)
 
 HELP = """Turn logs of 2D range scans into compact B-spline maps and trajectories.
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from bsmap_cli.cli.formats import MAP_FORMATS, MapFormat, chosen_format
 from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
-from bsmap_cli.cli.options import Force, MapIn, TalkFlags, numbers, option, parse_laser_pose
+from bsmap_cli.cli.options import Force, MapIn, TalkFlags, numbers, option
 from bsmap_cli.cli.outputs import STDOUT, Output, Outputs
+from bsmap_cli.cli.replay import ReplayFlags
 from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -65,23 +66,6 @@ class PartFlags:
     compress: Annotated[
         bool, option("--compress", help="bsm: 3 bytes a control point, not 9 (rounds to 1 mm).")
     ] = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayFlags:
-    """The log whose scans a viewer replays along the path."""
-
-    log: Annotated[
-        str | None,
-        option("--log", metavar="LOG", help="mcap: also the scans of this log along --traj."),
-    ] = None
-    topic: Annotated[
-        list[str] | None, option("--topic", "-t", metavar="TOPIC", help="The scans of this topic.")
-    ] = None
-    laser_pose: Annotated[
-        str | None,
-        option("--laser-pose", metavar="X,Y,YAW[,flip]", help="The laser on the base [m, deg]."),
-    ] = None
 
 
 def run(
@@ -156,10 +140,7 @@ def _check_options(part: PartFlags, replay: ReplayFlags, kind: MapFormat) -> Non
             raise UsageError(
                 f"{name} says nothing to {kind}: it goes with {', '.join(TAKERS[name])}"
             )
-    if replay.log is not None and part.traj is None:
-        raise UsageError("--log replays scans along a path with stamps: give that with --traj")
-    if replay.log is None and (replay.topic or replay.laser_pose):
-        raise UsageError("--topic and --laser-pose are about the log: give that with --log")
+    replay.check(part.traj)
 
 
 def _image_beside(outputs: Outputs, output: str) -> Output:
@@ -254,16 +235,5 @@ def _write_mcap(
 ) -> None:
     from bsmap_cli.exchange.viewer_mcap import write_viewer_mcap
 
-    if replay.log is None:
-        write_viewer_mcap(target.open(), selection, tolerance_m=tolerance_m)
-        return
-    from bsmap_cli.logs.open_log import open_log
-    from bsmap_cli.logs.reader import ReadOptions
-
-    pose, flipped = parse_laser_pose(replay.laser_pose)
-    options = ReadOptions(
-        topics=tuple(replay.topic or ()), pose_base_laser=pose, laser_flipped=flipped
-    )
-    with open_log([replay.log], options) as reader:
-        scans = reader.scans()
+    with replay.scans() as scans:
         write_viewer_mcap(target.open(), selection, scans=scans, tolerance_m=tolerance_m)
