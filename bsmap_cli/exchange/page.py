@@ -19,7 +19,8 @@ from bsmap_cli.mapping.sampling import drawn_pieces, sample_level
 from bsmap_cli.sensor.scan import Scan
 
 SCRIPTS = ("data.js", "view.js", "draw.js", "tools.js", "input.js")
-MOST_SCANS, MOST_POINTS = 600, 90  # a page of a long log stays below a megabyte
+# a page of a long log stays below a megabyte
+MOST_POSES, MOST_SCANS, MOST_POINTS = 20_000, 600, 90
 SCAN_QUANTUM_M = 0.01
 POINT_LIMIT = 32767
 
@@ -63,9 +64,14 @@ def _data(selection: Selection, scans: Iterable[Scan]) -> dict[str, Any]:
         "levels": levels,
     }
     if len(selection.path):
-        data["path"] = _path(selection)
+        every = -(-len(selection.path) // MOST_POSES)
+        data["path"] = _path(selection.path[::every], every)
         if selection.stamps_ns is not None:
-            data["scans"] = _scans(selection.stamps_ns, scans, document.finest.knot_step_m)
+            stamps_ns = selection.stamps_ns[::every]
+            seconds = (stamps_ns - stamps_ns[0]) * 1e-9
+            data["path"]["seconds"] = _packed(seconds, "<f4")
+            count = len(selection.stamps_ns)
+            data["scans"] = _scans(stamps_ns, scans, count, document.finest.knot_step_m)
     return data
 
 
@@ -98,24 +104,17 @@ def _level(selected: SelectedLevel) -> dict[str, Any]:
     }
 
 
-def _path(selection: Selection) -> dict[str, Any]:
-    path: dict[str, Any] = {
-        "count": len(selection.path),
-        "poses": _packed(selection.path, "<f4"),
-    }
-    if selection.stamps_ns is not None:
-        seconds = (selection.stamps_ns - selection.stamps_ns[0]) * 1e-9
-        path["seconds"] = _packed(seconds, "<f8")
-    return path
+def _path(poses: NDArray[np.float64], every: int) -> dict[str, Any]:
+    return {"count": len(poses), "every": every, "poses": _packed(poses, "<f4")}
 
 
 def _scans(
-    stamps_ns: NDArray[np.int64], scans: Iterable[Scan], knot_step_m: float
+    stamps_ns: NDArray[np.int64], scans: Iterable[Scan], count: int, knot_step_m: float
 ) -> dict[str, Any] | None:
-    """Returns of some scans in the base frame, each with the row of its pose; None without any."""
+    """Returns of some of `count` scans in the base frame, each with the row of its pose."""
     from bsmap_cli.sensor.gate import SensorSettings, find_returns
 
-    every = -(-len(stamps_ns) // MOST_SCANS)
+    every = -(-count // MOST_SCANS)
     rows, clouds = [], []
     for number, scan in enumerate(scans):
         if number % every:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from bsmap_cli.exchange.page import MOST_SCANS, write_page
+from bsmap_cli.exchange.page import MOST_POSES, MOST_SCANS, write_page
 from bsmap_cli.exchange.selection import select
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.sampling import evaluate
@@ -78,6 +78,11 @@ def test_scans_are_thinned_evenly():
     text = page(room_document(), trajectory=trajectory, scans=scans(trajectory)).decode()
     assert len(data_of(text)["scans"]["poses"]) == pytest.approx(MOST_SCANS * 4 * 4 / 3, rel=0.01)
     assert data_of(page(room_document(), trajectory=trajectory).decode())["scans"] is None
+
+
+def test_a_long_path_is_thinned():
+    text = page(room_document(), trajectory=walk(2 * MOST_POSES)).decode()
+    assert (data_of(text)["path"]["count"], data_of(text)["path"]["every"]) == (MOST_POSES, 2)
 
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here to show the page")

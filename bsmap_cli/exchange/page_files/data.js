@@ -119,8 +119,8 @@ function nearestSample(x, y, reach) {
 
 const levels = data.levels.map(buildLevel);
 const path = data.path && {
-  count: data.path.count, pose: unpack(data.path.poses, Float32Array),
-  seconds: data.path.seconds ? unpack(data.path.seconds, Float64Array) : null,
+  count: data.path.count, every: data.path.every, pose: unpack(data.path.poses, Float32Array),
+  seconds: data.path.seconds ? unpack(data.path.seconds, Float32Array) : null,
 };
 const scans = data.scans && {
   poses: unpack(data.scans.poses, Uint32Array), counts: unpack(data.scans.counts, Uint32Array),

@@ -89,9 +89,9 @@ function setPose(at) {
   $("time").value = player.at;
   const seconds = path.seconds && path.seconds[player.at];
   const pad = (n) => String(n).padStart(2, "0");
-  $("clock").textContent = path.seconds
-    ? `${Math.floor(seconds / 60)}:${pad(Math.floor(Math.abs(seconds) % 60))}  pose ${player.at + 1}`
-    : `pose ${player.at + 1} of ${path.count}`;
+  const minutes = path.seconds && `${Math.floor(seconds / 60)}:${pad(Math.floor(Math.abs(seconds) % 60))}`;
+  const pose = `pose ${player.at * path.every + 1}`; // of a long path only some poses are here
+  $("clock").textContent = minutes ? `${minutes}  ${pose}` : pose;
   redraw();
 }
 
