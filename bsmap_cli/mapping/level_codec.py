@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from dataclasses import dataclass
-from io import BytesIO
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.errors import MapFileError
+from bsmap_cli.mapping.decompression import ZSTD, decompress
 from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.varints import (
     Integers,
@@ -31,7 +30,6 @@ BLOCK_HEAD = struct.Struct("<dB7xI")
 QUANTUM_M = 2.0**-10
 Narrow = TypeVar("Narrow", bound=np.signedinteger[Any] | np.unsignedinteger[Any])
 
-ZSTD, DEFLATE = 1, 2
 ZSTD_LEVEL = 19
 LARGEST_QUANTUM_COUNT = 2.0**53
 
@@ -126,7 +124,7 @@ def decode_compressed(body: bytes, head: LevelHead) -> MapLevel:
             f"at most {head.most_stream_bytes} bytes of streams for {head.curves} curves and"
             f" {head.points} control points, found {length}"
         )
-    streams = _split(_decompress(body[BLOCK_HEAD.size :], codec, length))
+    streams = _split(decompress(body[BLOCK_HEAD.size :], codec, length))
     curves, points = head.curves, head.points
     taus = np.frombuffer(streams[1], "<f4")
     if len(taus) != 2 * curves:
@@ -209,34 +207,3 @@ def _split(block: bytes) -> list[bytes]:
     if at != len(block):
         raise ValueError(f"{at} bytes in the streams, found {len(block)}")
     return streams
-
-
-def _decompress(data: bytes, codec: int, length: int) -> bytes:
-    """Exactly `length` bytes; never grows past what the data really hold."""
-    if codec == ZSTD:
-        import zstandard
-
-        source = BytesIO(data)
-        try:
-            reader = zstandard.ZstdDecompressor().stream_reader(source)
-            pieces = []
-            left = length + 1
-            while left and (piece := reader.read(min(left, 1 << 20))):
-                pieces.append(piece)
-                left -= len(piece)
-        except zstandard.ZstdError as error:
-            raise ValueError(f"zstd data, found {error}") from error
-        block = b"".join(pieces)
-    elif codec == DEFLATE:
-        # a zlib header is told from bare deflate by its check bits
-        wrapped = len(data) > 1 and data[0] & 15 == 8 and (data[0] * 256 + data[1]) % 31 == 0
-        decoder = zlib.decompressobj(zlib.MAX_WBITS if wrapped else -zlib.MAX_WBITS)
-        try:
-            block = decoder.decompress(data, length + 1)
-        except zlib.error as error:
-            raise ValueError(f"deflate data, found {error}") from error
-    else:
-        raise ValueError(f"codec {ZSTD} (zstd) or {DEFLATE} (deflate), found {codec}")
-    if len(block) != length:
-        raise ValueError(f"{length} bytes of streams, found {len(block)} or more")
-    return block
