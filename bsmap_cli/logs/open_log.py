@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from bsmap_cli.errors import LogError
-from bsmap_cli.logs import carmen, csv_scans, mcap_records, rosbag1_container, sqlite_container
+from bsmap_cli.logs import carmen, csv_scans, mcap_records, rosbag1_records, sqlite_container
 from bsmap_cli.logs.byte_streams import DamagedBytesError, put_back, read_up_to
 from bsmap_cli.logs.carmen import CarmenParser
 from bsmap_cli.logs.csv_scans import CsvParser
@@ -67,7 +67,7 @@ _CONTAINERS: dict[str, Callable[[Source], Container]] = {
 _PARSERS: dict[str, type[CarmenParser | CsvParser]] = {"CARMEN": CarmenParser, "CSV": CsvParser}
 _MAGICS = {
     mcap_records.MAGIC: "MCAP",
-    rosbag1_container.MAGIC: "ROS 1 bag",
+    rosbag1_records.MAGIC: "ROS 1 bag",
     sqlite_container.MAGIC: "sqlite3",
 }
 
