@@ -34,10 +34,13 @@ def match_curves(
 ) -> Vector:
     """(3,) pose of the scan on the level, from `start_pose`."""
     samples, steps = settings.alignment.samples, settings.registration.iterations
-    if settings.registration.method == "curve":
-        pairs = pair_curves(level, clusters, start_pose, settings)
-        return register_curves(PairSystem(level, pairs, samples=samples), start_pose, steps)[0]
     step_m = level.knot_step_m
+    if settings.registration.method == "curve":
+        system = PairSystem(
+            level, pair_curves(level, clusters, start_pose, settings), samples=samples
+        )
+        reach_m = settings.association.track_dist * step_m
+        return register_curves(system, start_pose, reach_m=reach_m, iterations=steps)[0]
     kernel_m = max(settings.registration.kernel * step_m, 2.0 * sigma_m)
     pose = start_pose
     for _ in range(ROUNDS):

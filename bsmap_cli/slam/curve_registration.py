@@ -15,24 +15,24 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.slam.curve_equations import CurveEquations, PairSystem
 
-SINGULAR = 1e-6  # smaller eigenvalue ratios leave a direction where it was: a straight wall, an arc
+SINGULAR = 1e-3  # smaller eigenvalue ratios leave a direction where it was: a straight wall, an arc
 STILL = 1e-4  # a smaller step ends the iteration of a curve [knot steps]
 EXACT = 1e-3  # residuals count as at least this [knot steps]: no fit is better than its lattice
 
 
 def register_curves(
-    system: PairSystem, start_pose: Vector, iterations: int
-) -> tuple[Vector, int, NDArray[np.bool_]]:
-    """Joined pose (3,), steps taken, and which pairs had a say; `system.offsets` are updated.
+    system: PairSystem, start_pose: Vector, *, reach_m: float, iterations: int
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """Joined pose (3,), and which pairs had a say in it; `system.offsets` are updated.
 
-    A curve that has not come to rest after `iterations` steps, or has left the map curve, has none.
+    None has a curve that after `iterations` steps has not come to rest, has left the map curve, or
+    would move the robot further than `reach_m`, within which it is tracked at all.
     """
     step_m = system.curve_map.knot_step_m
     poses = np.tile(start_pose, (len(system.offsets), 1))
     moving = np.ones(len(poses), bool)
-    steps = 0
     equations = system.linearise(poses)
-    while steps < iterations and np.any(moving):
+    for _ in range(iterations):
         delta = curve_steps(equations, step_m)
         delta[~moving] = 0.0
         poses += delta[:, :3]
@@ -40,9 +40,11 @@ def register_curves(
         size = np.hypot(delta[:, 0], delta[:, 1]) + _levers(equations) * np.abs(delta[:, 2])
         moving &= size + step_m * np.abs(delta[:, 3]) > STILL * step_m
         equations = system.linearise(poses)
-        steps += 1
-    used = (equations.overlaps > 0.0) & ~moving
-    return join_poses(start_pose, poses, equations, used, step_m), steps, used
+        if not np.any(moving):
+            break
+    near = np.hypot(*(poses - start_pose)[:, :2].T) <= reach_m
+    used = (equations.overlaps > 0.0) & ~moving & near
+    return join_poses(start_pose, poses, equations, used, step_m), used
 
 
 def curve_steps(equations: CurveEquations, step_m: float) -> Points:
