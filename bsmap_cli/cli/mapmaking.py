@@ -89,6 +89,7 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         map_out = outputs.add(making.output, binary=True)
         traj_out = outputs.add(making.traj) if making.traj is not None else None
         settings = log.settings.settings(log.sensor.overrides())
+        check_levels(making.levels, settings.ladder)
         options = log.read.options()
         with open_log(log.logs, options) as reader:
 
@@ -130,21 +131,31 @@ def _final_document(
     return replace(chosen, path=path, meta={**chosen.meta, "logs": _describe(logs)})
 
 
-def with_levels(document: MapDocument, wanted: str) -> MapDocument:
-    """The document with the levels that `--levels` asks for.
+def check_levels(wanted: str, ladder: tuple[float, ...]) -> None:
+    """Refuse --levels that the ladder does not have, before the work.
 
     Raises
     ------
-    UsageError : a knot step that the ladder does not have.
+    UsageError : a knot step that is not one of the ladder's, or no number.
     """
+    if wanted in ("finest", "all"):
+        return
+    try:
+        steps = {float(part) for part in wanted.split(",")}
+    except ValueError:
+        steps = {0.0}
+    if not steps <= set(ladder):
+        known = ", ".join(f"{step:g}" for step in ladder)
+        raise UsageError(f"--levels {wanted}: give finest, all, or steps of the ladder ({known})")
+
+
+def with_levels(document: MapDocument, wanted: str) -> MapDocument:
+    """The document with the levels that `--levels` asks for, coarse to fine."""
     if wanted == "all" or document.parts:
         return document
     if wanted == "finest":
         return replace(document, levels=document.chosen_levels())
-    try:
-        steps = sorted({float(part) for part in wanted.split(",")}, reverse=True)
-    except ValueError as error:
-        raise UsageError(f"--levels {wanted}: give finest, all or knot steps [m]") from error
+    steps = sorted({float(part) for part in wanted.split(",")}, reverse=True)
     chosen = (level for step in steps for level in document.chosen_levels(step))
     return replace(document, levels=tuple(chosen))
 
@@ -155,7 +166,7 @@ def summary_line(report: dict[str, Any], map_bytes: int) -> str:
     parts = [
         f"{report['scans']} scans",
         f"{report['seconds']:.1f} s",
-        f"{pace:.0f} x real time" if pace is not None else "real time unknown",
+        f"{pace:.{0 if pace >= 10 else 1}f} x real time" if pace is not None else "no duration",
         f"{report['scans_skipped']} skipped",
         f"{report['loops']} loops closed",
         f"map {size(map_bytes)}",

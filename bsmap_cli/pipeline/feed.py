@@ -64,7 +64,9 @@ class Feed:
             yield scan
             self.progress.scans(self.count, self.span_s)
         if not self.count:
-            raise LogError("the log holds no usable scan: see `bsmap info` for what it holds")
+            raise LogError(
+                "the log holds no usable scan: see `bsmap check`, and --start, --end and --topic"
+            )
 
     @property
     def span_s(self) -> float:

@@ -58,17 +58,21 @@ class ReadFlags:
     ] = None
     start: Annotated[
         float | None,
-        option("--start", metavar="S", panel=READING, help="Begin so many seconds in."),
+        option("--start", metavar="S", panel=READING, min=0.0, help="Begin so many seconds in."),
     ] = None
     end: Annotated[
         float | None,
         option(
-            "--end", metavar="S", panel=READING, help="End so many seconds after the first scan."
+            "--end",
+            metavar="S",
+            panel=READING,
+            min=0.0,
+            help="End so many seconds after the first scan.",
         ),
     ] = None
     duration: Annotated[
         float | None,
-        option("--duration", metavar="S", panel=READING, help="Read so many seconds."),
+        option("--duration", metavar="S", panel=READING, min=0.0, help="Read so many seconds."),
     ] = None
     every: Annotated[
         int, option("--every", metavar="N", panel=READING, min=1, help="Take each N-th scan.")
@@ -118,6 +122,9 @@ class ReadFlags:
         from bsmap_cli.logs.reader import ReadOptions
 
         pose, flipped = parse_laser_pose(self.laser_pose)
+        end_s = self._end_s()
+        if end_s is not None and end_s <= (self.start or 0.0):
+            raise UsageError("no time lies between the start and the end: give a later --end")
         return ReadOptions(
             topics=tuple(self.topic or ()),
             odom=self.odom,
@@ -125,7 +132,7 @@ class ReadFlags:
             laser_flipped=flipped,
             base_frame=self.base_frame,
             start_s=self.start,
-            end_s=self._end_s(),
+            end_s=end_s,
             every=self.every,
             max_scans=self.max_scans,
             angle_min_rad=_radians(self.angle_min),
