@@ -12,7 +12,7 @@ from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.sensor.scan import Scan
 
 _TURN_LIMIT_RAD = 1.05 * math.tau
-_STAMP_LIMIT_NS = 2**63
+STAMP_LIMIT_NS = 2**63
 
 
 class _Sweep(NamedTuple):
@@ -42,7 +42,7 @@ def scan_of(
 
     Raises BadMessageError for a scan without beams or with angles that cannot be.
     """
-    if abs(stamp_ns) >= _STAMP_LIMIT_NS:
+    if abs(stamp_ns) >= STAMP_LIMIT_NS:
         raise BadMessageError("a stamp beyond 64 bits")
     _, _, low, step, time_step, near, far, ranges, _ = record
     sweep = _sweep((low, step, time_step, near, far), len(ranges), upside_down)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.clouds import CloudSlicer
 from bsmap_cli.logs.decoding import Kind
-from bsmap_cli.logs.laser import scan_of
+from bsmap_cli.logs.laser import STAMP_LIMIT_NS, scan_of
 from bsmap_cli.logs.messages import (
     SECOND_NS,
     BadMessageError,
@@ -97,6 +97,9 @@ class ScanStream:
     def _queue(self, topic: str, log_time_ns: int, record: LaserRecord | CloudRecord) -> bool:
         """Let a scan wait for its odometry; False when no more scans are asked for."""
         stamp_ns = record.stamp_ns
+        if abs(stamp_ns) >= STAMP_LIMIT_NS:
+            self._pass_over(topic, Kind.SCAN, BadMessageError("a stamp beyond 64 bits"))
+            return True
         if topic in self._frozen or (stamp_ns == 0 and log_time_ns != 0):
             how = "are zero" if stamp_ns == 0 else "stand still"
             self._report.warn(f"stamps of {topic} {how}: the time of recording is used")
