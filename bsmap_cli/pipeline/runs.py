@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bsmap_cli import __version__
 from bsmap_cli.config import Settings, settings_as_dict
 from bsmap_cli.errors import LogError
+from bsmap_cli.evaluation.pose_arrays import transform_poses
 from bsmap_cli.geometry.se2 import SE2, wrap_angle
 from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
@@ -105,13 +106,14 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
         slam.process(scan)
     progress.stage("closing loops and building the final map")
     result = slam.finish()
+    document, trajectory = _in_first_frame(result.document, result.trajectory)
     seconds = dict(slam.seconds)
     lost = len(result.figures["tracking_lost"])
     return _finished(
         feed,
         settings,
-        result.document,
-        result.trajectory,
+        document,
+        trajectory,
         figures=result.figures,
         stage_seconds={"register": seconds.pop("track", 0.0), **seconds},
         losses=(f"tracking was lost and started again ({lost} times)",) if lost else (),
@@ -166,6 +168,25 @@ def _finished(
         stage_seconds={"read": feed.read_s, **stage_seconds},
         span_s=feed.span_s,
         losses=losses,
+    )
+
+
+def _in_first_frame(
+    document: MapDocument, trajectory: Trajectory
+) -> tuple[MapDocument, Trajectory]:
+    """The same map and trajectory in the frame of the first pose, which refinement has moved."""
+    pose_first_map = SE2.from_array(trajectory.poses[0]).inverse()
+    levels = tuple(
+        replace(
+            level,
+            control_points=pose_first_map.transform(level.control_points.astype(float)).astype(
+                np.float32
+            ),
+        )
+        for level in document.levels
+    )
+    return replace(document, levels=levels), Trajectory(
+        trajectory.stamps_ns, transform_poses(pose_first_map, trajectory.poses)
     )
 
 
