@@ -18,7 +18,7 @@ from bsmap_cli.settings import setting
 RIDGE = 1e-8  # of the largest diagonal entry: keeps unobserved control points defined
 BEND_PENALTY = 1.0  # of `penalty`, on second differences where data are thin: ends go on straight
 ANCHOR = 1e-4  # of the same, to where a known control point lies
-SNAP = 1e-9  # lattice units: a parameter this close to a knot lies on it
+SNAP = 1e-4  # lattice units: a parameter this close to a knot lies on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +145,14 @@ def fit_control_points(
     for i in range(n - 2):
         weakest = min(share[i], share[i + 1], share[i + 2])
         pull = BEND_PENALTY * penalty * max(0.0, 1.0 - weakest)
+        tx = ty = 0.0
+        if is_known[i] * is_known[i + 1] * is_known[i + 2] > 0.0:
+            for a in range(3):
+                tx += bend[a] * known[i + a, 0]
+                ty += bend[a] * known[i + a, 1]
         for a in range(3):
+            solution[i + a, 0] += pull * bend[a] * tx
+            solution[i + a, 1] += pull * bend[a] * ty
             for b in range(a, 3):
                 band[i + a, b - a] += pull * bend[a] * bend[b]
     return solve_banded(band, solution)
@@ -168,7 +175,7 @@ def arc_length_parameters(
     arc = 0.0
     last = u[0]
     for j in range(len(u)):
-        pieces = 1 if j == 0 else max(1, math.ceil((u[j] - last) * samples))
+        pieces = 1 if j == 0 else max(1, math.ceil(abs(u[j] - last) * samples))
         start = last
         target = u[j]
         for piece in range(1, pieces + 1):
@@ -180,7 +187,8 @@ def arc_length_parameters(
                 x += basis[a] * control_points[span + a, 0]
                 y += basis[a] * control_points[span + a, 1]
             if j > 0 or piece > 1:
-                arc += math.hypot(x - x_before, y - y_before) / step_m
+                chord = math.hypot(x - x_before, y - y_before)
+                arc += math.copysign(chord, target - start) / step_m
             x_before, y_before = x, y
         last = target
         u[j] = arc

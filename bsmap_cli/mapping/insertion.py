@@ -71,6 +71,7 @@ def insert_clusters(
             curves,
             u,
             points,
+            tangents,
             float(settings.merging.max_weight),
             settings.fitting.penalty,
             settings.fitting.first_penalty,

@@ -9,7 +9,8 @@ from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import scan_levels
-from bsmap_cli.sensor.gate import Returns, estimate_range_sigma, find_returns
+from bsmap_cli.sensor.gate import Returns, find_returns
+from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
 
 
@@ -19,13 +20,12 @@ class Mapper:
     def __init__(self, settings: MappingSettings) -> None:
         self.settings = settings
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
-        self.sigma_m = settings.sensor.range_sigma_m
+        self.noise = RangeNoise(settings.sensor, settings.ladder[-1])
 
     def insert(self, scan: Scan, pose_map_base: SE2) -> None:
         """Algorithm 1: one scan enters the map at its pose."""
         finest = self.settings.ladder[-1]
-        if self.sigma_m is None:
-            self.sigma_m = estimate_range_sigma(scan, self.settings.sensor, finest)
+        self.noise.observe(scan)
         returns = find_returns(scan, self.settings.sensor, finest)
         self.insert_returns(returns, pose_map_base.as_array())
 
@@ -33,7 +33,7 @@ class Mapper:
         """Insert what `find_returns` gave, into every level."""
         settings = self.settings
         clusters = scan_levels(
-            returns, settings.ladder, settings.segmentation, settings.fitting, self.sigma_m or 0.0
+            returns, settings.ladder, settings.segmentation, settings.fitting, self.noise.sigma_m
         )
         for level, seen in zip(self.levels, clusters, strict=True):
             insert_clusters(level, seen, pose_map_base, settings)

@@ -20,7 +20,6 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import USABLE_WEIGHT, refresh_spans
 from bsmap_cli.mapping.fitting import (
     arc_length_parameters,
-    chord_length_parameters,
     fit_control_points,
     fit_rms,
     lattice_domain,
@@ -248,11 +247,20 @@ def merge_run(
 
 
 @njit(cache=True)
+def _advance(points: Points, tangents: Points, j: int) -> float:
+    """Way [m] from point j - 1 to j along the smoothed direction: noise does not lengthen it."""
+    dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
+    tx, ty = tangents[j, 0] + tangents[j - 1, 0], tangents[j, 1] + tangents[j - 1, 1]
+    return (dx * tx + dy * ty) / (math.hypot(tx, ty) + 1e-300)
+
+
+@njit(cache=True)
 def _run_parameters(
     run: NDArray[np.int64],
     curves: NDArray[np.int64],
     u: Vector,
     points: Points,
+    tangents: Points,
     matrix: Points,
     knot_step_m: float,
     first_penalty: float,
@@ -263,25 +271,18 @@ def _run_parameters(
     known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
     n = end - begin
     part = points[begin:end]
-    if known_end == known_begin:
-        chord_length_parameters(part, 0.0, knot_step_m, run_u)
-        anchor = 0
-    else:
-        anchor = known_begin - begin
-        for j in range(known_begin, known_end):
+    anchor = known_begin - begin
+    run_u[anchor] = u[known_begin] if known_end > known_begin else 0.0
+    for j in range(known_begin + 1, end):
+        if j < known_end and curves[j] == run[CURVE]:
             run_u[j - begin] = u[j]
-            if curves[j] != run[CURVE]:  # a miss that the run bridges
-                dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
-                run_u[j - begin] = run_u[j - 1 - begin] + math.hypot(dx, dy) / knot_step_m
-        for j in range(known_begin - 1, begin - 1, -1):
-            dx, dy = points[j + 1, 0] - points[j, 0], points[j + 1, 1] - points[j, 1]
-            run_u[j - begin] = run_u[j + 1 - begin] - math.hypot(dx, dy) / knot_step_m
-        for j in range(known_end, end):
-            dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
-            run_u[j - begin] = run_u[j - 1 - begin] + math.hypot(dx, dy) / knot_step_m
+        else:  # beyond the curve, or a miss that the run bridges
+            run_u[j - begin] = run_u[j - 1 - begin] + _advance(points, tangents, j) / knot_step_m
+    for j in range(known_begin - 1, begin - 1, -1):
+        run_u[j - begin] = run_u[j + 1 - begin] - _advance(points, tangents, j + 1) / knot_step_m
     if known_end - known_begin == n or n < 2:
         return
-    low, high = lattice_domain(run_u[0], run_u[n - 1])
+    low, high = lattice_domain(np.min(run_u), np.max(run_u))
     count = high - low + matrix.shape[0] - 1
     weights, first_fit = np.empty(n), np.empty((count, 2))
     spacing_weights(run_u, 1.0, weights)
@@ -313,6 +314,7 @@ def merge_runs(
     curves: NDArray[np.int64],
     u: Vector,
     points: Points,
+    tangents: Points,
     max_weight: float,
     penalty: float,
     first_penalty: float,
@@ -324,7 +326,9 @@ def merge_runs(
         begin, end = runs[r, BEGIN], runs[r, END]
         curve = runs[r, CURVE]
         run_u, weights = np.empty(end - begin), np.empty(end - begin)
-        _run_parameters(runs[r], curves, u, points, matrix, knot_step_m, first_penalty, run_u)
+        _run_parameters(
+            runs[r], curves, u, points, tangents, matrix, knot_step_m, first_penalty, run_u
+        )
         rows = math.ceil(np.max(run_u) - np.min(run_u)) + 2 * matrix.shape[0]
         if curve >= 0:
             rows += level.count[curve]

@@ -150,19 +150,3 @@ def find_returns(
         seam = int(np.argmax(gaps))
         points, lengths = np.roll(points, -seam, axis=0), np.roll(lengths, -seam)
     return Returns(points, lengths, scan.angle_increment_rad)
-
-
-def estimate_range_sigma(scan: Scan, settings: SensorSettings, knot_step_m: float) -> float | None:
-    """Deviation of the range noise [m] from second differences of neighbouring ranges.
-
-    A smooth surface leaves next to nothing in a second difference; noise leaves sqrt(6) sigma.
-    The median ignores edges. None where the scan has too few returns to tell.
-    """
-    near, far = range_limits(scan, settings, knot_step_m)
-    ranges = scan.ranges_m.astype(np.float64)
-    ranges[~((ranges >= near) & (ranges <= far))] = np.nan
-    second = ranges[:-2] - 2.0 * ranges[1:-1] + ranges[2:]
-    second = np.abs(second[np.isfinite(second)])
-    if len(second) < 30:
-        return None
-    return float(np.median(second)) / (0.6745 * math.sqrt(6.0))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bsmap_cli.geometry.se2 import Points
-from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.scan_levels import coarser_levels

@@ -12,7 +12,7 @@ from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
 from bsmap_cli.slam.ladder import track_down
-from bsmap_cli.slam.prediction import Prediction, Predictor
+from bsmap_cli.slam.prediction import Cadence, Prediction, Predictor
 from bsmap_cli.slam.recovery import recover
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.submap import Submap
@@ -48,6 +48,7 @@ class LocalSlam:
     _pose: SE2 = field(default_factory=SE2.identity)
     _lost_scans: int = 0
     _coasted_m: float = 0.0
+    _cadence: Cadence = field(default_factory=Cadence)
     _predictor: Predictor = field(init=False)
 
     def __post_init__(self) -> None:
@@ -59,17 +60,23 @@ class LocalSlam:
         return self._predictor.last_step
 
     def process(
-        self, scan_index: int, clusters: list[Clusters], pose_odom_base: SE2 | None
+        self,
+        scan_index: int,
+        stamp_ns: int,
+        clusters: list[Clusters],
+        pose_odom_base: SE2 | None,
     ) -> Tracked:
         """Predict, register, recover and, on a keyframe, insert."""
+        stretch = self._cadence.observe(stamp_ns)
         if not self.submaps:
             self._begin_submap()
-            self._predictor.observe(SE2.identity(), pose_odom_base)
+            self._predictor.observe(SE2.identity(), pose_odom_base, measured=False)
             return Tracked(
                 self._pose, self._insert(scan_index, clusters, None, False), False, False
             )
         prediction = self._predictor.predict(pose_odom_base)
-        result = self._register(clusters, prediction)
+        blind = stretch if pose_odom_base is None else 1.0
+        result = self._register(clusters, prediction, blind)
         told = result.points >= FEWEST_POINTS
         lost = told and result.inlier_ratio < self.settings.recovery.lost_below
         pose = self._pose @ prediction.step
@@ -78,7 +85,8 @@ class LocalSlam:
         self._lost_scans = self._lost_scans + 1 if lost else 0
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
-        self._predictor.observe(self._pose.inverse() @ pose, pose_odom_base)
+        measured = told and not lost and not result.degenerate
+        self._predictor.observe(self._pose.inverse() @ pose, pose_odom_base, measured=measured)
         self._pose = pose
         keyframe = None
         if self._lost_scans >= self.settings.recovery.patience:
@@ -95,7 +103,14 @@ class LocalSlam:
     def _older(self) -> Submap:
         return self.submaps[self.finished]
 
-    def _register(self, clusters: list[Clusters], prediction: Prediction) -> RegistrationResult:
+    def _register(
+        self, clusters: list[Clusters], prediction: Prediction, blind: float
+    ) -> RegistrationResult:
+        """Register down the ladder, and search where that fails.
+
+        blind : usual scan times that passed without odometry; in a gap the robot may have gone
+        anywhere near, and even a fair match may be of another place.
+        """
         submap, settings = self._older, self.settings
         last = submap.to_submap(self._pose)
         predicted = (last @ prediction.step).as_array()
@@ -109,9 +124,12 @@ class LocalSlam:
             sigma_m=self.sigma_m,
             settings=settings,
         )
-        if result.inlier_ratio >= settings.recovery.search_below or result.points < FEWEST_POINTS:
+        gap = blind > settings.recovery.gap
+        fair = result.inlier_ratio >= settings.recovery.search_below
+        if (fair and not gap) or result.points < FEWEST_POINTS:
             return result
-        reach_m = settings.recovery.reach * settings.ladder[-1]
+        wider = min(blind, settings.recovery.widest) if gap else 1.0
+        reach_m = settings.recovery.reach * settings.ladder[-1] * wider
         way = math.hypot(prediction.step.x, prediction.step.y)
         guesses = [(predicted, reach_m + 0.5 * way), (last.as_array(), reach_m + way)]
         return recover(
@@ -120,6 +138,7 @@ class LocalSlam:
             guesses,
             result,
             information,
+            reach_rad=math.radians(min(180.0, settings.recovery.reach_deg * wider)),
             sigma_m=self.sigma_m,
             recovery=settings.recovery,
             registration=settings.registration,

@@ -63,7 +63,6 @@ class LoopCloser:
 
     local: LocalSlam
     graph: SubmapGraph
-    sigma_m: float
     loops: list[Loop] = field(default_factory=list)
     tried: int = 0
     _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
@@ -80,9 +79,9 @@ class LoopCloser:
         candidates = self._candidates(keyframe)
         if not candidates:
             return
-        finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.sigma_m)
+        finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.local.sigma_m)
         settings = self.local.settings
-        clusters = coarser_levels(finest, settings.ladder, settings.fitting, self.sigma_m)
+        clusters = coarser_levels(finest, settings.ladder, settings.fitting, self.local.sigma_m)
         for submap, reach_m, reach_rad in candidates[: settings.loops.tries]:
             self._try(keyframe, clusters, submap, reach_m, reach_rad)
 
@@ -157,7 +156,7 @@ class LoopCloser:
             guess,
             guess,
             isotropic_information(deviation),
-            sigma_m=self.sigma_m,
+            sigma_m=self.local.sigma_m,
             settings=settings.registration,
         )
         if not self._good(result, unit):

@@ -10,7 +10,7 @@ import numpy as np
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.settings import setting
 
-
+MEMORY = 0.05  # share of the newest surprise
 ODOMETRY_DRIFT = 0.1  # of the way: what raw odometry slips at its worst
 
 
@@ -25,9 +25,19 @@ class PredictionSettings:
         3.0, "of an odometry turn, to which the turn is added", minimum=0.0
     )
     motion_sigma: float = setting(
-        0.15, "of constant velocity, without odometry [finest knot steps]", minimum=0.0
+        0.3,
+        "of constant velocity at first; then what it was seen to be [finest knot steps]",
+        minimum=0.0,
     )
-    motion_sigma_deg: float = setting(1.5, "of constant turn rate, without odometry", minimum=0.0)
+    motion_sigma_deg: float = setting(2.0, "of constant turn rate, at first", minimum=0.0)
+    motion_floor: float = setting(
+        0.05,
+        "both never sink below this [finest knot steps], the angle not below a tenth of its first value",
+        minimum=0.0,
+    )
+    motion_margin: float = setting(
+        3.0, "times the deviation seen of late: motion changes suddenly", minimum=1.0
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +66,8 @@ class Predictor:
         self.unit_m = finest_step_m
         self._odometry: SE2 | None = None
         self.last_step = SE2.identity()
+        self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
+        self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
 
     def predict(self, pose_odom_base: SE2 | None) -> Prediction:
         """The step from the last scan to this one; `observe` must follow."""
@@ -69,12 +81,48 @@ class Predictor:
                 math.radians(settings.odometry_sigma_deg) + abs(step.theta),
                 ODOMETRY_DRIFT * way,
             )
-        sigma_m = settings.motion_sigma * self.unit_m
+        sigma_m = settings.motion_margin * self._spread_m
         return Prediction(
-            self.last_step, sigma_m, math.radians(settings.motion_sigma_deg), sigma_m
+            self.last_step, sigma_m, settings.motion_margin * self._spread_rad, sigma_m
         )
 
-    def observe(self, step: SE2, pose_odom_base: SE2 | None) -> None:
-        """Tell what the step turned out to be."""
+    def observe(self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool) -> None:
+        """Tell what the step turned out to be, and whether the walls said so in all directions."""
+        if measured:
+            surprise = self.last_step.inverse() @ step
+            settings = self.settings
+            floor_m = settings.motion_floor * self.unit_m / settings.motion_margin
+            floor_rad = 0.1 * math.radians(settings.motion_sigma_deg) / settings.motion_margin
+            squared = 0.5 * (surprise.x**2 + surprise.y**2)
+            self._spread_m = max(floor_m, _faded(self._spread_m, squared))
+            self._spread_rad = max(floor_rad, _faded(self._spread_rad, surprise.theta**2))
         self.last_step = step
         self._odometry = pose_odom_base
+
+
+def _faded(spread: float, squared: float) -> float:
+    """Root mean square with a memory of about twenty scans."""
+    return math.sqrt((1.0 - MEMORY) * spread**2 + MEMORY * squared)
+
+
+class Cadence:
+    """How long the scans usually lie apart, to know a gap in the log when one comes."""
+
+    def __init__(self) -> None:
+        self._usual_ns = 0.0
+        self._last_ns: int | None = None
+
+    def observe(self, stamp_ns: int) -> float:
+        """Time since the last scan, in usual times; 1 where stamps repeat or step back.
+
+        The usual time follows the median: a step up or down by 5 % a scan, whatever the size.
+        """
+        elapsed = 0.0 if self._last_ns is None else float(stamp_ns - self._last_ns)
+        self._last_ns = stamp_ns
+        if elapsed <= 0.0:
+            return 1.0
+        if self._usual_ns == 0.0:
+            self._usual_ns = elapsed
+        stretch = elapsed / self._usual_ns
+        self._usual_ns *= 1.05 if stretch > 1.0 else 1.0 / 1.05
+        return stretch

@@ -36,6 +36,10 @@ class RecoverySettings:
         4.0, "half width of the search round a guess [finest knot steps]", minimum=0.0
     )
     reach_deg: float = setting(35.0, "half width of its angles", minimum=0.0, maximum=180.0)
+    gap: float = setting(
+        4.0, "usual scan times that make a gap in a log without odometry", minimum=1.0
+    )
+    widest: float = setting(10.0, "times that a gap widens the search, at most", minimum=1.0)
     patience: int = setting(
         3, "scans in a row that must be lost before a new submap is begun", minimum=1
     )
@@ -48,6 +52,7 @@ def recover(
     best: RegistrationResult,
     prior_information: Points,
     *,
+    reach_rad: float,
     sigma_m: float,
     recovery: RecoverySettings,
     registration: RegistrationSettings,
@@ -61,7 +66,7 @@ def recover(
     likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
     coarse = clusters[max(0, len(clusters) - 2)]
     for pose, reach_m in guesses:
-        window = Window(pose, reach_m, np.radians(recovery.reach_deg))
+        window = Window(pose, reach_m, reach_rad)
         peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.2)
         if peak is None:
             continue

@@ -30,7 +30,9 @@ from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
-TANGENT_NOISE = 0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
+TANGENT_NOISE = (
+    0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
+)
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 

@@ -13,7 +13,8 @@ from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.scan_levels import scan_levels
-from bsmap_cli.sensor.gate import estimate_range_sigma, find_returns
+from bsmap_cli.sensor.gate import find_returns
+from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.final_map import final_map
@@ -55,6 +56,7 @@ class Slam:
     def __init__(self, settings: SlamSettings) -> None:
         self.settings = settings
         self._log = ScanLog()
+        self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
         self._local: LocalSlam | None = None
         self._closer: LoopCloser | None = None
         self._lost: list[dict[str, int]] = []
@@ -67,12 +69,11 @@ class Slam:
         """Track one scan, insert it if it is a keyframe, and look for loops."""
         settings = self.settings
         started = time.perf_counter()
-        if self._local is None:
-            sigma_m = settings.sensor.range_sigma_m
-            if sigma_m is None:
-                sigma_m = estimate_range_sigma(scan, settings.sensor, settings.ladder[-1])
-            self._local = LocalSlam(settings, sigma_m or 0.1 * settings.ladder[-1])
-            self._closer = LoopCloser(self._local, SubmapGraph(self._local), self._local.sigma_m)
+        sigma_m = self._noise.observe(scan)
+        if self._local is None or self._closer is None:
+            self._local = LocalSlam(settings, sigma_m)
+            self._closer = LoopCloser(self._local, SubmapGraph(self._local))
+        self._local.sigma_m = sigma_m
         local = self._local
         returns = find_returns(scan, settings.sensor, settings.ladder[-1], self._twist(scan))
         clusters = scan_levels(
@@ -80,7 +81,7 @@ class Slam:
         )
         segmented = time.perf_counter()
         index = len(self._log.stamps_ns)
-        tracked = local.process(index, clusters, scan.pose_odom_base)
+        tracked = local.process(index, scan.stamp_ns, clusters, scan.pose_odom_base)
         done = time.perf_counter()
         self.seconds["fit"] += segmented - started
         self.seconds["track"] += done - segmented

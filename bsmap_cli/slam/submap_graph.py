@@ -47,9 +47,7 @@ class SubmapGraph:
                 self._optimise()
             self._stale = self._urgent = False
 
-    def add_loop(
-        self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool
-    ) -> None:
+    def add_loop(self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool) -> None:
         """A closure saw submap j from submap i."""
         self._loops.add(i, j, pose_i_j.as_array(), information, loop=True)
         self._stale = True
@@ -66,10 +64,11 @@ class SubmapGraph:
         from scipy.sparse.csgraph import dijkstra
 
         n = len(self.poses)
+        match = way_deviation(0.0, self._local.settings.ladder[-1])
         first = list(range(n - 1)) + self._loops.first
         second = list(range(1, n)) + self._loops.second
-        metres = [link[0] for link in self._links] + [0.02] * len(self._loops)
-        radians = [link[1] for link in self._links] + [0.003] * len(self._loops)
+        metres = [link[0] for link in self._links] + [match[0]] * len(self._loops)
+        radians = [link[1] for link in self._links] + [match[1]] * len(self._loops)
         graph = {}
         for name, values in (("m", metres), ("rad", radians)):
             lightest: dict[tuple[int, int], float] = {}

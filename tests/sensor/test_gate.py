@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.gate import (
     SensorSettings,
-    estimate_range_sigma,
     find_returns,
     range_limits,
 )
+from bsmap_cli.sensor.range_noise import estimate_range_sigma
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.simulator.simulation import simulate
 
