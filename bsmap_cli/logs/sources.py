@@ -15,6 +15,7 @@ from bsmap_cli.logs.byte_streams import is_packed, put_back, unpack
 
 STDIN = "-"
 METADATA_FILE = "metadata.yaml"
+_METADATA_LIMIT_BYTES = 1 << 20
 
 
 @dataclass(slots=True)
@@ -24,6 +25,7 @@ class Source:
     name : for messages to the user.
     path : the file, or None for a stream.
     found : whether the source was come upon in a folder rather than named by the user.
+    lacks : parts of the same bag that its `metadata.yaml` names and that are not there.
     ours : the stream below `stream` that was opened here, to be closed here.
     """
 
@@ -32,6 +34,7 @@ class Source:
     stream: BinaryIO | None = None
     found: bool = False
     ours: BinaryIO | None = None
+    lacks: tuple[str, ...] = ()
     _front: bytes = b""
 
     @contextmanager
@@ -128,11 +131,25 @@ def _parts(source: Source) -> list[Source]:
     children = [child for child in children if not child.is_dir() or _is_bag_folder(child)]
     if not children:
         raise LogError(f"{path} is a folder without a log: name a log")
+    lacks = _missing_parts(path, [child.name for child in children])
     return [
         part
         for child in children
-        for part in _parts(Source(name=f"{path.name}/{child.name}", path=child, found=True))
+        for part in _parts(
+            Source(name=f"{path.name}/{child.name}", path=child, found=True, lacks=lacks)
+        )
     ]
+
+
+def _missing_parts(folder: Path, names: list[str]) -> tuple[str, ...]:
+    """The parts of a bag that are not in its folder, packed or not."""
+    if not _is_bag_folder(folder):
+        return ()
+    with _opened(folder / METADATA_FILE) as file:
+        text = file.read(_METADATA_LIMIT_BYTES).decode("utf-8", "replace")
+    listed = re.search(r"^ *relative_file_paths:[ ]*\n((?:[ ]*- .*\n)*)", text, re.MULTILINE)
+    parts = re.findall(r"- *[\"']?([^\"'\n]+)", listed[1]) if listed else []
+    return tuple(part for part in parts if not any(name.startswith(part) for name in names))
 
 
 def _is_bag_folder(path: Path) -> bool:

@@ -114,6 +114,18 @@ def test_split_bag_keeps_the_mounting_of_its_first_part(tmp_path):
     assert report.warnings == []
 
 
+def test_a_part_that_is_missing_is_told(tmp_path):
+    folder = MAKERS["ros2 mcap"](tmp_path / "bag", SCANS)
+    metadata = folder / "metadata.yaml"
+    text = metadata.read_text()
+    assert not read(folder)[1].truncated
+    metadata.write_text(text.replace("  - bag.mcap\n", "  - bag.mcap\n  - bag_1.mcap\n", 1))
+    found, report = read(folder)
+    assert len(found) == 200
+    assert report.truncated
+    assert "bag_1.mcap" in report.warnings[0]
+
+
 def test_bags_without_definitions(tmp_path):
     """ROS 2 bags older than Iron carry none."""
     import sqlite3
