@@ -1,5 +1,6 @@
 """CARMEN and CSV in their variants."""
 
+import dataclasses
 import math
 from decimal import Decimal
 
@@ -216,7 +217,7 @@ def test_headers_that_lack_something(tmp_path, header, says):
 
 def test_a_scan_that_changes_its_beams_survives_csv(tmp_path):
     scans = [some_scans(1, beams)[0] for beams in (20, 25, 20, 7)]
-    write_log(tmp_path / "x.csv", scans, "csv")
+    assert write_log(tmp_path / "x.csv", scans, "csv") == 4
     found, _ = read(tmp_path / "x.csv")
     assert [len(scan.ranges_m) for scan in found] == [20, 25, 20, 7]
     assert_same(found, scans)
@@ -234,7 +235,7 @@ def test_what_only_some_scans_have_survives_csv(tmp_path):
             range_max_m=float32(30.1),
             time_increment_s=float32(-1.7e-5),
             pose_base_laser=pose,
-            pose_odom_base=scan.pose_odom_base if i % 2 == 0 else None,
+            pose_odom_base=scan.pose_odom_base if i % 2 == 1 else None,
         )
         for i, scan in enumerate(SCANS)
     ]
@@ -247,6 +248,15 @@ def test_what_only_some_scans_have_survives_csv(tmp_path):
         == (float32(0.1), float32(30.1), pose)
         for scan in found
     )
+
+
+def test_what_has_no_column_is_not_dropped(tmp_path):
+    scans = some_scans(300, 5)
+    late = [dataclasses.replace(s, pose_odom_base=None) for s in scans[:250]] + scans[250:]
+    with pytest.raises(LogError, match="mcap"):
+        write_log(tmp_path / "x.csv", late, "csv")
+    write_log(tmp_path / "x.csv", late[100:], "csv")
+    assert_same(read(tmp_path / "x.csv")[0], late[100:])
 
 
 def test_a_hanging_laser_by_option(tmp_path):
