@@ -14,7 +14,20 @@ from bsmap_cli.cli.command import command
 from bsmap_cli.cli.help import GroupedCommand
 
 VERBS = (
-    *("slam", "map", "stats", "info", "check", "eval", "export", "plot", "view", "sim", "scans"),
+    *(
+        "slam",
+        "map",
+        "stats",
+        "info",
+        "check",
+        "eval",
+        "export",
+        "plot",
+        "view",
+        "query",
+        "sim",
+        "scans",
+    ),
     "config",
 )
 
@@ -53,7 +66,9 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
                 group.command(name, cls=GroupedCommand)(command(function))
             app.add_typer(group)
         else:
-            app.command(verb, cls=GroupedCommand)(command(module.run))
+            settings = getattr(module, "CONTEXT", None)
+            add = app.command(verb, cls=GroupedCommand, context_settings=settings)
+            add(command(module.run))
     return app
 
 
