@@ -12,7 +12,7 @@ from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, evaluate
 
 SAMPLES_PER_STEP = 8  # of the search for candidates
-CHORDS_PER_STEP = 16  # a chord strays from its curve by about 1e-3 of the knot step
+CHORDS_PER_STEP = 8  # a chord strays from its curve by about 2e-3 of the knot step
 CANDIDATES = 16
 NEWTON_STEPS = 6
 PAIRS_AT_ONCE = 4_000_000
@@ -68,16 +68,20 @@ class MapQuery:
         if not len(self):
             raise ValueError("the map draws no curve")
         count = min(CANDIDATES, len(self._u))
-        _, candidates = self._tree.query(points, k=np.arange(1, count + 1))
-        piece, u = self._piece[candidates].ravel(), self._u[candidates].ravel()
-        targets = np.repeat(points, count, axis=0)
-        curve = self._pieces.curve[piece]
+        found = self._tree.query(points, k=np.arange(1, count + 1))
+        reach, candidates = np.asarray(found[0]), np.asarray(found[1])
+        # what lies farther than the best sample by more than two samples apart cannot win
+        slack = 2.0 * self._level.knot_step_m / SAMPLES_PER_STEP
+        row, rank = np.nonzero(reach <= reach[:, :1] + slack)
+        piece, u = self._piece[candidates[row, rank]], self._u[candidates[row, rank]]
+        curve, targets = self._pieces.curve[piece], points[row]
         low, high = self._pieces.start[piece], self._pieces.end[piece]
         for _ in range(NEWTON_STEPS):
             u = np.clip(u - self._newton_step(curve, u, targets), low, high)
         feet, _ = evaluate(self._level, curve, u)
-        distance = np.hypot(*(targets - feet).T).reshape(-1, count)
-        best = np.arange(len(points)) * count + np.argmin(distance, axis=1)
+        distance = np.hypot(*(targets - feet).T)
+        order = np.lexsort((distance, row))
+        best = order[np.searchsorted(row[order], np.arange(len(points)))]
         return self._described(points, feet[best], curve[best], u[best])
 
     def rays(self, origins: Points, angles_rad: Vector, range_max_m: float = np.inf) -> RayHits:
@@ -156,7 +160,7 @@ def _first_hits(
     cos, sin = np.cos(angles_rad)[:, None], np.sin(angles_rad)[:, None]
     along, across = end - start, start[None] - origins[:, None]
     cross = cos * along[:, 1] - sin * along[:, 0]  # (rays, chords)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         reach = (across[..., 0] * along[:, 1] - across[..., 1] * along[:, 0]) / cross
         share = (across[..., 0] * sin - across[..., 1] * cos) / cross
     met = (cross != 0.0) & (reach >= 0.0) & (share >= 0.0) & (share <= 1.0)
