@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.curve_equations import PairSystem
-from bsmap_cli.slam.curve_pairs import pair_curves
+from bsmap_cli.slam.curve_pairs import pairing
 from bsmap_cli.slam.curve_registration import register_curves
 from bsmap_cli.slam.joint_registration import register_jointly
 from bsmap_cli.slam.registration import MODEL_ERROR
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from bsmap_cli.slam.slam_settings import SlamSettings
 
 SAMPLES_PER_STEP = 2.0  # where all curves are registered at once, long ones weigh more
-ROUNDS = 3  # of pairing anew from the pose found
+KERNELS = (math.inf, 4.0, 2.0)  # of `registration.kernel`, one after the other: wide, then robust
 
 
 def match_curves(
@@ -35,21 +34,22 @@ def match_curves(
     """(3,) pose of the scan on the level, from `start_pose`."""
     samples, steps = settings.alignment.samples, settings.registration.iterations
     step_m = level.knot_step_m
+    pairs_from = pairing(level, clusters, settings)
     if settings.registration.method == "curve":
-        system = PairSystem(
-            level, pair_curves(level, clusters, start_pose, settings), samples=samples
-        )
+        system = PairSystem(level, pairs_from(start_pose), samples=samples)
         reach_m = settings.association.track_dist * step_m
         return register_curves(system, start_pose, reach_m=reach_m, iterations=steps)[0]
     kernel_m = max(settings.registration.kernel * step_m, 2.0 * sigma_m)
     pose = start_pose
-    for _ in range(ROUNDS):
-        before = pose
-        pairs = pair_curves(level, clusters, pose, settings)
+    for widening in KERNELS:
         system = PairSystem(
-            level, pairs, samples=samples, dense=SAMPLES_PER_STEP, kernel_m=2.0 * kernel_m
+            level,
+            pairs_from(pose),
+            samples=samples,
+            dense=SAMPLES_PER_STEP,
+            kernel_m=widening * kernel_m,
         )
-        pose, _ = register_jointly(
+        pose = register_jointly(
             system,
             pose,
             prior_pose,
@@ -57,6 +57,4 @@ def match_curves(
             variance_m2=sigma_m**2 + (MODEL_ERROR * step_m) ** 2,
             iterations=steps,
         )
-        if np.hypot(*(pose - before)[:2]) < 0.05 * step_m:
-            break
     return pose

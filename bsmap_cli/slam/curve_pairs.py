@@ -7,6 +7,7 @@ for a map curve and an offset with their foot points.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -23,6 +24,7 @@ from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.segmentation import Clusters
 
 VOTES_PER_STEP = 2  # samples of a scan's curve that look for their foot points
+VOTE_REACH = 1.0  # longest way from a sample to its foot point [knot steps]
 FEWEST_VOTES = 4
 
 
@@ -53,15 +55,14 @@ class CurvePairs:
         self.offsets.append(offset)
 
 
-def pair_curves(
-    curve_map: CurveMap, clusters: Clusters, pose: Vector, settings: MappingSettings
-) -> CurvePairs:
-    """The pairs of one scan seen from about `pose`, (3,), by the association that is set."""
+def pairing(
+    curve_map: CurveMap, clusters: Clusters, settings: MappingSettings
+) -> Callable[[Vector], CurvePairs]:
+    """The association that is set, for the clusters of one scan: pairs as seen from a pose (3,)."""
     if settings.association.method == "centroid":
-        return _pair_by_centroids(curve_map, clusters, pose, settings)
-    return pair_by_votes(
-        curve_map, scan_curves(curve_map, clusters, settings), pose, gate_m=curve_map.knot_step_m
-    )
+        return lambda pose: pair_by_centroids(curve_map, clusters, pose, settings)
+    curves = scan_curves(curve_map, clusters, settings)
+    return lambda pose: pair_by_votes(curve_map, curves, pose)
 
 
 def scan_curves(curve_map: CurveMap, clusters: Clusters, settings: MappingSettings) -> list[Curve]:
@@ -80,9 +81,10 @@ def _fit(curve_map: CurveMap, points: Points, start_m: float, settings: MappingS
     )
 
 
-def _pair_by_centroids(
+def pair_by_centroids(
     curve_map: CurveMap, clusters: Clusters, pose: Vector, settings: MappingSettings
 ) -> CurvePairs:
+    """Pair each cluster with the map curve of the last scan's cluster nearest to it."""
     pairs, last = CurvePairs(), curve_map.tracks
     if last is None:
         return pairs
@@ -99,12 +101,10 @@ def _pair_by_centroids(
     return pairs
 
 
-def pair_by_votes(
-    curve_map: CurveMap, curves: list[Curve], pose: Vector, *, gate_m: float
-) -> CurvePairs:
+def pair_by_votes(curve_map: CurveMap, curves: list[Curve], pose: Vector) -> CurvePairs:
     """Pair curves of the body frame with the map curves near their samples.
 
-    Samples further than `gate_m` from every curve have no vote; one scan curve may lie on
+    Samples further than a knot step from every curve have no vote; one scan curve may lie on
     several map curves and makes a pair with each.
     """
     pairs = CurvePairs()
@@ -125,7 +125,7 @@ def pair_by_votes(
         frame.transform(points),
         tangents,
         starts,
-        gate_m,
+        VOTE_REACH * step,
         found,
         u_map,
     )

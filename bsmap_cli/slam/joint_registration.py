@@ -45,28 +45,27 @@ def register_jointly(
     *,
     variance_m2: float,
     iterations: int,
-) -> tuple[Vector, int]:
-    """Pose (3,) and steps taken; `system.offsets` are updated.
+) -> Vector:
+    """Pose (3,); `system.offsets` are updated.
 
     variance_m2 : of a residual over one knot step of curve, which weighs the data against the
     prior. Directions that the curves do not see keep the prior's pose.
     """
-    pose, step_m, steps = start_pose.copy(), system.curve_map.knot_step_m, 0
+    pose, step_m = start_pose.copy(), system.curve_map.knot_step_m
     for _ in range(iterations):
         equations = system.linearise(np.tile(pose, (len(system.offsets), 1)))
         data, right = eliminate_offsets(equations)
         wanted = prior_pose - pose
         wanted[2] = math.remainder(wanted[2], math.tau)
         full = data / variance_m2 + prior_information
-        delta = np.linalg.solve(full, right / variance_m2 + prior_information @ wanted)
+        delta: Vector = np.linalg.solve(full, right / variance_m2 + prior_information @ wanted)
         lever = math.sqrt(equations.levers.sum() / max(equations.weights.sum(), 1e-300))
         delta = _keep_unseen(data, lever, wanted, delta)
         pose += delta
         system.offsets -= offset_steps(equations, delta)
-        steps += 1
         if math.hypot(delta[0], delta[1]) + lever * abs(delta[2]) < STILL * step_m:
             break
-    return pose, steps
+    return pose
 
 
 def _keep_unseen(data: Points, lever_m: float, wanted: Vector, delta: Vector) -> Vector:
