@@ -58,7 +58,8 @@ def register_jointly(
         wanted = prior_pose - pose
         wanted[2] = math.remainder(wanted[2], math.tau)
         full = data / variance_m2 + prior_information
-        delta: Vector = np.linalg.solve(full, right / variance_m2 + prior_information @ wanted)
+        wish = right / variance_m2 + prior_information @ wanted
+        delta = np.linalg.solve(full, wish).astype(np.float64)
         lever = math.sqrt(equations.levers.sum() / max(equations.weights.sum(), 1e-300))
         delta = _keep_unseen(data, lever, wanted, delta)
         pose += delta
