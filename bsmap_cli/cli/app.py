@@ -74,6 +74,8 @@ def build_app(arguments: Sequence[str]) -> typer.Typer:
 
 def _wanted(arguments: Sequence[str]) -> Sequence[str]:
     first = next((argument for argument in arguments if not argument.startswith("-")), None)
+    if list(arguments) == ["--version"]:
+        return []
     return [first] if first in VERBS and "_BSMAP_COMPLETE" not in os.environ else VERBS
 
 
