@@ -115,7 +115,7 @@ class Cadence:
     def observe(self, stamp_ns: int) -> float:
         """Time since the last scan, in usual times; 1 where stamps repeat or step back.
 
-        The usual time follows the median: a step up or down by 5 % a scan, whatever the size.
+        The usual time is a mean that forgets; one gap hardly moves it.
         """
         elapsed = 0.0 if self._last_ns is None else float(stamp_ns - self._last_ns)
         self._last_ns = stamp_ns
@@ -124,5 +124,5 @@ class Cadence:
         if self._usual_ns == 0.0:
             self._usual_ns = elapsed
         stretch = elapsed / self._usual_ns
-        self._usual_ns *= 1.05 if stretch > 1.0 else 1.0 / 1.05
+        self._usual_ns += MEMORY * (min(elapsed, 3.0 * self._usual_ns) - self._usual_ns)
         return stretch

@@ -37,7 +37,7 @@ class RecoverySettings:
     )
     reach_deg: float = setting(35.0, "half width of its angles", minimum=0.0, maximum=180.0)
     gap: float = setting(
-        4.0, "usual scan times that make a gap in a log without odometry", minimum=1.0
+        8.0, "usual scan times that make a gap in a log without odometry", minimum=1.0
     )
     widest: float = setting(10.0, "times that a gap widens the search, at most", minimum=1.0)
     patience: int = setting(
