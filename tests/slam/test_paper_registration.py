@@ -9,7 +9,7 @@ from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.fitting import fit_curve
 from bsmap_cli.slam.curve_equations import CurveEquations, PairSystem
 from bsmap_cli.slam.curve_matching import match_curves
-from bsmap_cli.slam.curve_pairs import CurvePairs, pair_by_votes, scan_curves
+from bsmap_cli.slam.curve_pairs import CurvePairs, _count_votes, pair_by_votes, scan_curves
 from bsmap_cli.slam.curve_registration import curve_steps, join_poses, register_curves
 from bsmap_cli.slam.joint_registration import (
     eliminate_offsets,
@@ -207,6 +207,15 @@ def test_joined_poses_weigh_with_what_each_curve_knows():
     np.testing.assert_array_equal(kept, truth)
 
 
+def test_a_curve_that_does_not_fit_has_next_to_no_say():
+    curve_map, pairs = map_and_pairs(winding(), winding(seed=5))
+    equations = PairSystem(curve_map, pairs, samples=40).linearise(np.zeros((2, 3)))
+    equations.squares[:] = equations.weights * np.array([1e-8, (0.2 * STEP) ** 2])
+    apart = np.array([[0.01, 0.0, 0.0], [0.0, 0.05, 0.1]])
+    joined = join_poses(np.zeros(3), apart, equations, np.array([True, True]), STEP)
+    np.testing.assert_allclose(joined, apart[0], atol=1e-3)
+
+
 def test_a_curve_that_would_move_the_robot_out_of_reach_has_no_say():
     curve_map, pairs = map_and_pairs(winding())
     start = np.array([0.1, 0.1, 0.05])
@@ -228,6 +237,28 @@ def test_votes_find_every_wall_and_its_offset():
         there = curve_map.curve(index).evaluate(np.array([(u + offset) * STEP]))
         here = CENTRE.transform(curve.evaluate(np.array([u * STEP])))
         assert np.hypot(*(there - here)[0]) < 0.15
+
+
+def test_one_curve_of_a_scan_may_lie_on_two_of_the_map():
+    halves = [line((-2.0, 1.5), (-0.05, 1.5)), line((0.05, 1.5), (2.0, 1.5))]
+    curve_map = map_of(halves)
+    whole = seen_from(STILL, [line((-1.5, 1.5), (1.5, 1.5))])
+    pairs = pair_by_votes(curve_map, scan_curves(curve_map, whole, DEFAULT), np.zeros(3))
+    assert pairs.map_curves == [0, 1]
+    np.testing.assert_allclose(pairs.offsets, [5.0, -15.5], atol=0.1)
+    np.testing.assert_allclose(pairs.supports, [(0.0, 14.5), (15.5, 30.0)], atol=0.6)
+
+
+def test_votes_for_another_offset_do_not_count():
+    """Where a curve comes near itself again, fewer samples say so: they are left out."""
+    pairs, u = CurvePairs(), np.arange(0.0, 20.0, 0.5)
+    curve = fit_curve(winding(), PAPER.fitting, knot_step_m=STEP, degree=3)
+    u_map = u + np.where(u < 6.0, 40.0, 7.0)
+    _count_votes(pairs, curve, u, np.zeros(len(u), np.int64), u_map)
+    assert pairs.offsets == [7.0]
+    assert pairs.supports == [(5.75, 19.75)]
+    _count_votes(pairs, curve, u[:3], np.zeros(3, np.int64), u_map[:3])
+    assert len(pairs) == 1  # three votes are none
 
 
 def test_no_curve_near_no_pair():
