@@ -124,45 +124,30 @@ def _search(
     cell_m: float,
     floor: float,
     barred: Points,
-    results: Points,
-) -> int:
-    """Best score of every angle that beats `floor`: rows of score, angle index, dx, dy."""
+) -> tuple[float, int, int, int]:
+    """Best score above `floor`, or -1, its angle index and translation; likely blocks first."""
     top = grids.shape[0] - 1
     block = 1 << top
-    cells = np.empty((len(points), 3), np.int64)
+    cells = np.empty((len(angles), len(points), 3), np.int64)
     blocks = (2 * reach + 1 + block - 1) // block
-    bounds = np.empty(blocks * blocks)
-    count = 0
+    bounds = np.empty(len(angles) * blocks * blocks)
     for a in range(len(angles)):
-        _project(points, tangents, angles[a], x, y, cell_m, cells)
+        _project(points, tangents, angles[a], x, y, cell_m, cells[a])
         for k in range(blocks * blocks):
-            bx, by = k % blocks, k // blocks
-            bounds[k] = _score(grids, top, cells, bx * block - reach, by * block - reach)
-        best = floor
-        score, dx, dy = -1.0, 0, 0
-        for k in np.argsort(-bounds):
-            if bounds[k] <= best:
-                break
-            found, fx, fy = _descend(
-                grids,
-                cells,
-                top,
-                (k % blocks) * block - reach,
-                (k // blocks) * block - reach,
-                reach,
-                best,
-                barred[a],
-            )
-            if found > best:
-                best = score = found
-                dx, dy = fx, fy
-        if score > 0.0:
-            results[count, 0] = score
-            results[count, 1] = a
-            results[count, 2] = dx
-            results[count, 3] = dy
-            count += 1
-    return count
+            bx, by = k % blocks * block - reach, k // blocks * block - reach
+            bounds[a * blocks * blocks + k] = _score(grids, top, cells[a], bx, by)
+    best, score = floor, -1.0
+    angle, dx, dy = 0, 0, 0
+    for k in np.argsort(-bounds, kind="mergesort"):
+        if bounds[k] <= best:
+            break
+        a, b = k // (blocks * blocks), k % (blocks * blocks)
+        bx, by = b % blocks * block - reach, b // blocks * block - reach
+        found, fx, fy = _descend(grids, cells[a], top, bx, by, reach, best, barred[a])
+        if found > best:
+            best = score = found
+            angle, dx, dy = a, fx, fy
+    return score, angle, dx, dy
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,14 +184,15 @@ def search(
     radius = float(np.hypot(points[:, 0], points[:, 1]).max())
     turn = cell_m / max(radius, 4.0 * cell_m)
     steps = math.ceil(min(window.reach_rad, math.pi) / turn)
-    angles = centre[2] + np.arange(-steps, steps + 1) * turn
+    offsets = np.arange(-steps, steps + 1)
+    # what lies near the guess is tried first: a good score spares much of the rest
+    angles = centre[2] + offsets[np.argsort(np.abs(offsets), kind="stable")] * turn
     discs = np.zeros((len(angles), 3))
     if barred is not None:
         discs[:, :2] = (barred.pose[:2] - centre[:2]) / cell_m
         turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
         discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
-    results = np.empty((len(angles), 4))
-    count = _search(
+    score, angle, dx, dy = _search(
         likelihood.grids,
         points,
         tangents,
@@ -217,10 +203,7 @@ def search(
         cell_m,
         floor,
         discs,
-        results,
     )
-    if count == 0:
+    if score < 0.0:
         return None
-    score, angle, dx, dy = results[np.argmax(results[:count, 0])]
-    pose = np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[int(angle)]])
-    return Peak(pose, float(score))
+    return Peak(np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[angle]]), score)
