@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,16 +10,13 @@ import numpy as np
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
-from bsmap_cli.slam.ladder import track_down
-from bsmap_cli.slam.prediction import Cadence, Prediction, Predictor
-from bsmap_cli.slam.recovery import recover
+from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
+from bsmap_cli.slam.prediction import Cadence, Predictor
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.submap import Submap
 
 if TYPE_CHECKING:
     from bsmap_cli.slam.slam_settings import SlamSettings
-
-FEWEST_POINTS = 10  # a scan with fewer says nothing about being lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +72,20 @@ class LocalSlam:
             )
         prediction = self._predictor.predict(pose_odom_base)
         blind = stretch if pose_odom_base is None else 1.0
-        result = self._register(clusters, prediction, blind)
+        result = match_scan(
+            self.older,
+            clusters,
+            self.older.to_submap(self._pose),
+            prediction,
+            blind=blind,
+            sigma_m=self.sigma_m,
+            settings=self.settings,
+        )
         told = result.points >= FEWEST_POINTS
         lost = told and result.inlier_ratio < self.settings.recovery.lost_below
         pose = self._pose @ prediction.step
         if not lost and told:
-            pose = self._older.pose_local @ SE2.from_array(result.pose)
+            pose = self.older.pose_local @ SE2.from_array(result.pose)
         self._lost_scans = self._lost_scans + 1 if lost else 0
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
@@ -100,49 +104,9 @@ class LocalSlam:
         return Tracked(pose, keyframe, lost, result.degenerate > 0)
 
     @property
-    def _older(self) -> Submap:
+    def older(self) -> Submap:
+        """The active submap that scans are matched against."""
         return self.submaps[self.finished]
-
-    def _register(
-        self, clusters: list[Clusters], prediction: Prediction, blind: float
-    ) -> RegistrationResult:
-        """Register down the ladder, and search where that fails.
-
-        blind : usual scan times that passed without odometry; in a gap the robot may have gone
-        anywhere near, and even a fair match may be of another place.
-        """
-        submap, settings = self._older, self.settings
-        last = submap.to_submap(self._pose)
-        predicted = (last @ prediction.step).as_array()
-        information = prediction.information()
-        result = track_down(
-            submap.levels,
-            clusters,
-            predicted,
-            predicted,
-            information,
-            sigma_m=self.sigma_m,
-            settings=settings,
-        )
-        gap = blind > settings.recovery.gap
-        fair = result.inlier_ratio >= settings.recovery.search_below
-        if (fair and not gap) or result.points < FEWEST_POINTS:
-            return result
-        wider = min(blind, settings.recovery.widest) if gap else 1.0
-        reach_m = settings.recovery.reach * settings.ladder[-1] * wider
-        way = math.hypot(prediction.step.x, prediction.step.y)
-        guesses = [(predicted, reach_m + 0.5 * way), (last.as_array(), reach_m + way)]
-        return recover(
-            submap,
-            clusters,
-            guesses,
-            result,
-            information,
-            reach_rad=math.radians(min(180.0, settings.recovery.reach_deg * wider)),
-            sigma_m=self.sigma_m,
-            recovery=settings.recovery,
-            registration=settings.registration,
-        )
 
     def _insert(
         self,
@@ -167,7 +131,7 @@ class LocalSlam:
         for submap in self.submaps[self.finished :]:
             submap.insert(keyframe.index, clusters, submap.to_submap(self._pose))
         full = self.settings.submaps.keyframes
-        if len(self._older.keyframes) >= full and len(self.submaps) > self.finished + 1:
+        if len(self.older.keyframes) >= full and len(self.submaps) > self.finished + 1:
             self.finished += 1
         if len(self.submaps[-1].keyframes) >= full // 2 and len(self.submaps) == self.finished + 1:
             self._begin_submap()

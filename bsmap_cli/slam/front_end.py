@@ -1,0 +1,53 @@
+"""What tracking sees of a scan: its returns, cut into clusters for each level of the ladder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bsmap_cli.geometry.se2 import SE2, Vector
+from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.sensor.gate import find_returns
+from bsmap_cli.sensor.range_noise import RangeNoise
+from bsmap_cli.sensor.scan import Scan
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
+
+
+class FrontEnd:
+    """Turns scans into clusters, in the order of the log; learns the noise on the way.
+
+    sigma_m : deviation of the range noise [m], after the last scan.
+    """
+
+    def __init__(self, settings: SlamSettings) -> None:
+        self._settings = settings
+        self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
+        self._last_stamp_ns: int | None = None
+
+    @property
+    def sigma_m(self) -> float:
+        """Deviation of the range noise [m]."""
+        return self._noise.sigma_m
+
+    def clusters(self, scan: Scan, last_step: SE2) -> list[Clusters]:
+        """Clusters of one scan, coarse to fine; `last_step` is the motion since the scan before."""
+        settings = self._settings
+        self._noise.observe(scan)
+        twist = self._twist(scan, last_step)
+        self._last_stamp_ns = scan.stamp_ns
+        returns = find_returns(scan, settings.sensor, settings.ladder[-1], twist)
+        return scan_levels(
+            returns, settings.ladder, settings.segmentation, settings.fitting, self.sigma_m
+        )
+
+    def _twist(self, scan: Scan, last_step: SE2) -> Vector | None:
+        """Velocity (vx, vy, omega) of the base, for logs that say when each beam was fired."""
+        if self._last_stamp_ns is None:
+            return None
+        elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)
+        sweep = abs(scan.time_increment_s) * len(scan.ranges_m)
+        if not 0.0 < sweep <= 1.5 * elapsed:
+            return None
+        return last_step.as_array() / elapsed
