@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.scan_levels import coarser_levels
@@ -20,12 +21,18 @@ if TYPE_CHECKING:
     from bsmap_cli.slam.slam_settings import SlamSettings
 
 
+FEW_KEYFRAMES = 20  # a log with fewer has no views to spare
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FinalMapSettings:
     """How the finished map is made."""
 
     rounds: int = setting(
         2, "times that every keyframe is registered against the whole map", minimum=0
+    )
+    min_views: int = setting(
+        3, "a curve that fewer keyframes met does not enter the finished map", minimum=0
     )
     rebuild: bool = setting(
         True, "build the map anew with the final poses; off: keep what tracking built"
@@ -86,4 +93,13 @@ def final_map(
     for _ in range(settings.final_map.rounds):
         levels = build_map(poses, keyframes, ladder, settings, sigma_m)
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
-    return poses, build_map(poses, keyframes, settings.ladder, settings, sigma_m)
+    levels = build_map(poses, keyframes, settings.ladder, settings, sigma_m)
+    for level in levels:
+        if len(keyframes) >= FEW_KEYFRAMES:
+            drop_unconfirmed(level, settings.final_map.min_views)
+        tidy(
+            level,
+            max_weight=float(settings.merging.max_weight),
+            min_length=settings.segmentation.min_length,
+        )
+    return poses, levels

@@ -1,0 +1,257 @@
+"""Tidy a level once it stands: absorb what is drawn twice, join ends that meet.
+
+A wall seen first in pieces leaves curves that overlap or follow one another. The lighter of two
+that run together gives way where the heavier covers it; where one then begins at the other's end,
+it is sampled and fitted on the other's lattice, as their offsets differ by no whole number of knots.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
+from bsmap_cli.mapping.level_arrays import LevelArrays
+from bsmap_cli.mapping.merging import merge_run
+from bsmap_cli.mapping.span_index import EMPTY, cell_key, find_slot, remove_span
+
+SAMPLES = 4  # a knot step
+COVER_STEPS, COVER_COSINE = 0.5, 0.866  # runs together: within half a knot step and 30 degrees
+ABSORBED = 0.8  # covered share at which a curve goes altogether
+JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = (
+    1.0,
+    0.25,
+    0.94,
+)  # gap along and aside [knot steps], 20 degrees
+
+
+@njit(cache=True)
+def sample_curve(
+    level: LevelArrays, matrix: Points, curve: int, u: Vector, points: Points, tangents: Points
+) -> None:
+    """Points and unit tangents of a curve at the parameters u [lattice units]."""
+    degree = matrix.shape[0] - 1
+    polynomial = np.empty((degree + 1, 2))
+    base = level.first[curve] + degree
+    for j in range(len(u)):
+        span = min(max(math.floor(u[j]) - base, 0), level.count[curve] - degree - 1)
+        span_polynomial(level.points, level.offset[curve] + span, matrix, polynomial)
+        x, y, dx, dy, _, _ = polynomial_jet(polynomial, u[j] - base - span)
+        norm = math.hypot(dx, dy) + 1e-300
+        points[j, 0], points[j, 1] = x, y
+        tangents[j, 0], tangents[j, 1] = dx / norm, dy / norm
+
+
+@njit(cache=True)
+def _mean_weight(level: LevelArrays, curve: int) -> float:
+    offset = level.offset[curve]
+    return float(np.mean(level.weights[offset : offset + level.count[curve]]))
+
+
+@njit(cache=True)
+def _is_covered(
+    level: LevelArrays,
+    knot_step_m: float,
+    heaviness: Vector,
+    curve: int,
+    u: float,
+    px: float,
+    py: float,
+    tx: float,
+    ty: float,
+    degree: int,
+) -> bool:
+    """Does a heavier curve, or a much earlier part of this one, pass here in this direction?"""
+    column, line = math.floor(px / knot_step_m), math.floor(py / knot_step_m)
+    reach2 = (COVER_STEPS * knot_step_m) ** 2
+    for i in range(column - 1, column + 2):
+        for j in range(line - 1, line + 2):
+            slot = find_slot(level, cell_key(i, j))
+            if level.cell_keys[slot] == EMPTY:
+                continue
+            row = level.cell_heads[slot]
+            while row >= 0:
+                other = level.owner[row]
+                span_u = float(level.first[other] + degree + row - level.offset[other])
+                earlier = other == curve and span_u + 3.0 < u
+                if earlier or (other != curve and heaviness[other] > heaviness[curve]):
+                    hx, hy = level.spans[row, 2], level.spans[row, 3]
+                    half2 = hx * hx + hy * hy + 1e-300
+                    dx, dy = px - level.spans[row, 0], py - level.spans[row, 1]
+                    s = min(1.0, max(-1.0, (dx * hx + dy * hy) / half2))
+                    ex, ey = dx - s * hx, dy - s * hy
+                    along = (hx * tx + hy * ty) / math.sqrt(half2)
+                    if along > COVER_COSINE and ex * ex + ey * ey < reach2:
+                        return True
+                row = level.next_span[row]
+    return False
+
+
+@njit(cache=True)
+def cut_curve(
+    level: LevelArrays, matrix: Points, knot_step_m: float, curve: int, start: float, end: float
+) -> None:
+    """Keep of a curve only what lies in [start, end]; nothing of it where that is empty."""
+    offset, count = level.offset[curve], level.count[curve]
+    if end <= start:
+        for row in range(offset, offset + count):
+            remove_span(level, row)
+        level.count[curve] = 0
+        return
+    level.support[curve, 0] = start
+    level.support[curve, 1] = end
+    refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
+
+
+@njit(cache=True)
+def _absorb(level: LevelArrays, matrix: Points, knot_step_m: float, least: float) -> None:
+    """Cut from each curve, the lightest first, the ends that heavier ones cover."""
+    degree = matrix.shape[0] - 1
+    curves = level.sizes[0]
+    heaviness = np.empty(curves)
+    for c in range(curves):
+        length = level.support[c, 1] - level.support[c, 0]
+        heaviness[c] = _mean_weight(level, c) * length if level.count[c] > 0 else 0.0
+    for curve in np.argsort(heaviness, kind="mergesort"):
+        if level.count[curve] == 0:
+            continue
+        start, end = level.support[curve, 0], level.support[curve, 1]
+        n = max(2, math.ceil((end - start) * SAMPLES) + 1)
+        u = np.linspace(start, end, n)
+        points, tangents = np.empty((n, 2)), np.empty((n, 2))
+        sample_curve(level, matrix, curve, u, points, tangents)
+        covered = np.zeros(n, np.bool_)
+        for j in range(n):
+            covered[j] = _is_covered(
+                level,
+                knot_step_m,
+                heaviness,
+                curve,
+                u[j],
+                points[j, 0],
+                points[j, 1],
+                tangents[j, 0],
+                tangents[j, 1],
+                degree,
+            )
+        if np.mean(covered) > ABSORBED:
+            cut_curve(level, matrix, knot_step_m, curve, start, start)
+            continue
+        first, last = 0, n - 1
+        while first < n and covered[first]:
+            first += 1
+        while last > first and covered[last]:
+            last -= 1
+        if first == 0 and last == n - 1:
+            continue
+        if u[last] - u[first] < least:
+            cut_curve(level, matrix, knot_step_m, curve, start, start)
+        else:
+            cut_curve(level, matrix, knot_step_m, curve, u[first], u[last])
+
+
+def _ends(curve_map: CurveMap) -> tuple[NDArray[np.int64], Points, Points]:
+    """Live curves, (k, 2, 2) their end points and (k, 2, 2) the tangents there."""
+    arrays = curve_map.arrays
+    live = np.flatnonzero(arrays.count[: len(curve_map)] > 0)
+    points, tangents = np.empty((len(live), 2, 2)), np.empty((len(live), 2, 2))
+    for k, curve in enumerate(live):
+        u = arrays.support[curve].copy()
+        sample_curve(arrays, curve_map.matrix, curve, u, points[k], tangents[k])
+    return live, points, tangents
+
+
+def _join(curve_map: CurveMap, first: int, second: int, along_m: float, max_weight: float) -> None:
+    """Let curve `second` go on at the end of `first`, which it meets after `along_m`."""
+    step = curve_map.knot_step_m
+    length = curve_map.arrays.support[second, 1] - curve_map.arrays.support[second, 0]
+    curve_map.reserve(2 * int(curve_map.arrays.count[first] + curve_map.arrays.count[second]) + 64)
+    arrays = curve_map.arrays
+    n = max(8, math.ceil(8 * length))
+    own_u = np.linspace(arrays.support[second, 0], arrays.support[second, 1], n)
+    points, tangents = np.empty((n, 2)), np.empty((n, 2))
+    sample_curve(arrays, curve_map.matrix, second, own_u, points, tangents)
+    end_u = arrays.support[first, 1]
+    u = end_u + along_m / step + own_u - own_u[0]
+    keep = u > end_u + 0.05
+    base = int(arrays.offset[second] - arrays.first[second])
+    middle = base + np.floor(own_u[keep]).astype(int) - curve_map.degree // 2
+    weights = arrays.weights[np.clip(middle, base + arrays.first[second], None)]
+    old_end = int(arrays.first[first] + arrays.count[first])
+    seen = int(max(arrays.seen[first], arrays.seen[second]))
+    if keep.sum() < 2 or not merge_run(
+        arrays,
+        curve_map.matrix,
+        step,
+        first,
+        u[keep],
+        points[keep],
+        np.full(int(keep.sum()), length / n),
+        max_weight,
+        1e-6,
+        math.inf,
+        False,
+    ):
+        return
+    arrays.seen[first] = seen
+    grown = int(arrays.first[first] + arrays.count[first])
+    for g in range(old_end - curve_map.degree, grown):
+        near = int(
+            np.argmin(np.abs(u[keep] - (g - 0.5 * (curve_map.degree - 1) + curve_map.degree)))
+        )
+        row = int(arrays.offset[first] + g - arrays.first[first])
+        arrays.weights[row] = max(arrays.weights[row], weights[near])
+    cut_curve(arrays, curve_map.matrix, step, second, 0.0, 0.0)
+
+
+def _followers(curve_map: CurveMap) -> list[tuple[float, int, int, float]]:
+    """Pairs of curves whose end and start meet: cost, first, second, gap along [m]; best first."""
+    from scipy.spatial import cKDTree
+
+    live, points, tangents = _ends(curve_map)
+    step = curve_map.knot_step_m
+    if len(live) < 2:
+        return []
+    reach = step * math.hypot(JOIN_STEPS, JOIN_ASIDE)
+    near = cKDTree(points[:, 0]).query_ball_point(points[:, 1], reach, return_sorted=True)
+    found = []
+    for i, starts in enumerate(near):
+        for j in starts:
+            gap, (tx, ty) = points[j, 0] - points[i, 1], tangents[i, 1]
+            along = float(gap[0] * tx + gap[1] * ty)
+            aside = abs(float(gap[1] * tx - gap[0] * ty))
+            parallel = float(tangents[j, 0] @ tangents[i, 1])
+            if i != j and aside < JOIN_ASIDE * step and parallel > JOIN_COSINE:
+                found.append((abs(along) + 4.0 * aside, int(live[i]), int(live[j]), along))
+    return sorted(found)
+
+
+def _join_ends(curve_map: CurveMap, max_weight: float) -> int:
+    """Join each end to the start that continues it best; how many were joined."""
+    used: set[int] = set()
+    for _, first, second, along in _followers(curve_map):
+        if first not in used and second not in used:
+            used.update((first, second))
+            _join(curve_map, first, second, along, max_weight)
+    return len(used) // 2
+
+
+def tidy(curve_map: CurveMap, *, max_weight: float, min_length: float) -> None:
+    """Absorb duplicates and join what follows on, until nothing joins any more."""
+    for _ in range(6):
+        _absorb(curve_map.arrays, curve_map.matrix, curve_map.knot_step_m, min_length)
+        if not _join_ends(curve_map, max_weight):
+            break
+
+
+def drop_unconfirmed(curve_map: CurveMap, min_views: int) -> None:
+    """Take out the curves that fewer than `min_views` scans have met: what passes is no map."""
+    arrays = curve_map.arrays
+    for curve in range(len(curve_map)):
+        if arrays.count[curve] > 0 and arrays.seen[curve] < min_views:
+            cut_curve(arrays, curve_map.matrix, curve_map.knot_step_m, curve, 0.0, 0.0)
