@@ -9,7 +9,7 @@ that fails, the search begins anew.
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from bsmap_cli.slam.uncertainty import isotropic_information
 
 WITNESSES = 8  # keyframes that must agree with a place, the newest ones
 AGREEING = 0.75  # of them
+SUSPICIOUS = 0.04  # of a scan's points that fit the map usually, and now do not
+MEMORY = 0.02  # share of the newest scan in what is usual
 PATIENCE_SHARE = 8  # a search that failed is repeated once this share more has been seen
 
 
@@ -63,6 +65,7 @@ class Localizer:
         self._converged: int | None = None
         self._lost_scans = self._lost_in_a_row = 0
         self._pose = SE2.identity()
+        self._usual_ratio = 0.0
         self._cadence = Cadence()
         self._predictor = Predictor(self.settings.prediction, self.settings.ladder[-1])
         self._begin_seeking()
@@ -94,13 +97,15 @@ class Localizer:
             prediction,
             blind=stretch if scan.pose_odom_base is None else 1.0,
             sigma_m=self._front.sigma_m,
-            settings=self.settings,
+            settings=self._wary(),
         )
         told = result.points >= FEWEST_POINTS
         lost = told and result.inlier_ratio < self.settings.recovery.lost_below
         pose = self._pose @ prediction.step
         if told and not lost:
             pose = SE2.from_array(result.pose)
+            memory = MEMORY if self._usual_ratio else 1.0
+            self._usual_ratio += memory * (result.inlier_ratio - self._usual_ratio)
         measured = told and not lost and not result.degenerate
         step = self._pose.inverse() @ pose
         self._predictor.observe(step, scan.pose_odom_base, measured=measured)
@@ -110,6 +115,19 @@ class Localizer:
         self._lost_scans += lost
         if self._lost_in_a_row >= self.settings.recovery.patience:
             self._begin_seeking()
+
+    def _wary(self) -> SlamSettings:
+        """Settings that search as soon as a scan fits the map less well than usual.
+
+        A finished map explains nearly all of a scan: what it does not may tell of a slip along a
+        wall. How much that is depends on what has changed since the map was made.
+        """
+        recovery = self.settings.recovery
+        search_below = max(recovery.search_below, self._usual_ratio - SUSPICIOUS)
+        gain = min(recovery.gain, 0.5 * SUSPICIOUS)
+        return replace(
+            self.settings, recovery=replace(recovery, search_below=search_below, gain=gain)
+        )
 
     def _begin_seeking(self) -> None:
         self._local: LocalSlam | None = LocalSlam(self.settings, self._front.sigma_m)
