@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO
 
 from bsmap_cli.cli.formats import TRAJECTORY_FORMATS
-from bsmap_cli.cli.signals import end_if_asked
+from bsmap_cli.cli.signals import end_if_asked, unfinished
 from bsmap_cli.cli.talk import is_terminal
 from bsmap_cli.errors import BsmapError, UsageError
 
@@ -132,6 +132,7 @@ class Output:
         if self.direct:
             return io.BufferedWriter(_NamedFile(self.final, "wb", self.path))
         self._part = self.final.with_name(f".{self.final.name}.{token_hex(4)}.part")
+        unfinished.add(self._part)
         return io.BufferedWriter(_NamedFile(self._part, "xb", self.path))
 
     def finish(self) -> None:
@@ -147,7 +148,7 @@ class Output:
         """The output appears under its name."""
         if self._part is not None:
             self._part.replace(self.final)
-            self._part = None
+            self._forget_part()
         elif isinstance(self._file, io.BytesIO):
             sys.stdout.buffer.write(self._file.getbuffer())
             sys.stdout.buffer.flush()
@@ -156,9 +157,14 @@ class Output:
         """Remove what was not published."""
         if self._part is not None:
             self._part.unlink(missing_ok=True)
-            self._part = None
+            self._forget_part()
         if self._file is not None and self.path != STDOUT:
             self._close_quietly()
+
+    def _forget_part(self) -> None:
+        if self._part is not None:
+            unfinished.discard(self._part)
+            self._part = None
 
     def _close_quietly(self) -> None:
         try:

@@ -1,15 +1,24 @@
 """Signals that end a run: they become exceptions, so that temporary files go.
 
-A compiler at work may swallow the exception of Ctrl-C, or turn it into another one; the signal
-is remembered, so that the run ends at the next scan all the same.
+A compiler at work may swallow an exception, turn it into another one, or be left in a state that
+crashes; there the run ends at once, by hand.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any
+
+COMPILERS = ("numba", "llvmlite")
+CLEAR_BAR = "\r\x1b[2K\x1b[?25h"  # the line of the progress bar, and the cursor it hid
+
+unfinished: set[Path] = set()
+"""Temporary files of this run: removed where it ends without unwinding."""
 
 _arrived: list[int] = []
 
@@ -39,7 +48,9 @@ def ending_signal() -> int | None:
     return _arrived[0] if _arrived else None
 
 
-def _leave(number: int, _frame: FrameType | None) -> None:
+def _leave(number: int, frame: FrameType | None) -> None:
+    if _in_compiler(frame):
+        _end_at_once(number)
     _arrived.append(number)
     _raise(number)
 
@@ -48,6 +59,26 @@ def _raise(number: int) -> None:
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     raise SystemExit(128 + number)
+
+
+def _in_compiler(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if str(frame.f_globals.get("__name__", "")).split(".")[0] in COMPILERS:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _end_at_once(number: int) -> None:
+    """Leave without unwinding the compiler's frames."""
+    for part in list(unfinished):
+        with suppress(OSError):
+            part.unlink()
+    with suppress(OSError, ValueError):
+        if sys.stderr is not None:
+            clear = CLEAR_BAR if sys.stderr.isatty() else ""
+            os.write(sys.stderr.fileno(), f"{clear}error: interrupted\n".encode())
+    os._exit(128 + number)
 
 
 def _unraisable(problem: Any) -> None:
