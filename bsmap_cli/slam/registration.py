@@ -29,7 +29,7 @@ from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
 
-SHARED = 4.0  # neighbouring points err alike: so many count as one against the prior
+SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 TANGENT_NOISE = (
     0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
 )
