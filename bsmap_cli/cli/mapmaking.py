@@ -90,6 +90,9 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         traj_out = outputs.add(making.traj) if making.traj is not None else None
         settings = log.settings.settings(log.sensor.overrides())
         check_levels(making.levels, settings.ladder)
+        if making.levels != "finest":
+            every = replace(settings.final_map, all_levels=True)
+            settings = replace(settings, final_map=every)
         options = log.read.options()
         with open_log(log.logs, options) as reader:
 

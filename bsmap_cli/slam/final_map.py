@@ -37,6 +37,9 @@ class FinalMapSettings:
     rebuild: bool = setting(
         True, "build the map anew with the final poses; off: keep what tracking built"
     )
+    all_levels: bool = setting(
+        False, "make the coarser levels of the finished map too, not the finest alone"
+    )
     levels: int = setting(2, "levels of the ladder, from the finest up, used for that", minimum=1)
 
 
@@ -93,7 +96,8 @@ def final_map(
     for _ in range(settings.final_map.rounds):
         levels = build_map(poses, keyframes, ladder, settings, sigma_m)
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
-    levels = build_map(poses, keyframes, settings.ladder, settings, sigma_m)
+    written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
+    levels = build_map(poses, keyframes, written, settings, sigma_m)
     for level in levels:
         if len(keyframes) >= FEW_KEYFRAMES:
             drop_unconfirmed(level, settings.final_map.min_views)
