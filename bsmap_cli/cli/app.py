@@ -17,6 +17,7 @@ VERBS = (
     *(
         "slam",
         "map",
+        "localize",
         "stats",
         "info",
         "check",
