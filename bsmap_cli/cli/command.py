@@ -10,6 +10,7 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import partial
 from typing import Any, get_type_hints
 
+from bsmap_cli.cli.compiled_code import keep_compiled_code
 from bsmap_cli.cli.door import guarded
 from bsmap_cli.cli.talk import Talk
 
@@ -39,6 +40,7 @@ def command(function: Command) -> Command:
         }
         talk = next((group.talk() for group in filled.values() if hasattr(group, "talk")), Talk())
         _route_logging(talk)
+        keep_compiled_code(talk)
         return guarded(partial(function, **filled), talk)
 
     run.__doc__ = function.__doc__

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from bsmap_cli.cli.compiled_code import compiled_note
 from bsmap_cli.cli.signals import end_if_asked
 from bsmap_cli.cli.talk import Talk, is_terminal
 from bsmap_cli.pipeline import Silent
@@ -65,9 +66,7 @@ class _Plain(Silent):
             self._tell_start()
             waited_s = perf_counter() - self._began
             if waited_s > SLOW_START_S:
-                self._talk.note(
-                    f"compiled for this machine in {waited_s:.0f} s; later runs start at once"
-                )
+                self._talk.note(compiled_note(waited_s))
             self._began = perf_counter()
 
 

@@ -1,0 +1,43 @@
+"""Where compiled code is kept from run to run; somewhere, even where nothing may be written."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping, MutableMapping
+from pathlib import Path
+
+import bsmap_cli
+from bsmap_cli.cli.talk import Talk
+
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"
+FOR_ONCE = "bsmap-once-"
+
+
+def keep_compiled_code(talk: Talk, environment: MutableMapping[str, str] = os.environ) -> None:
+    """Give the compiler a folder for this run, where neither package nor home can be written."""
+    if CACHE_VARIABLE in environment or _can_be_made(Path(bsmap_cli.__file__).parent):
+        return
+    home = Path(os.path.expanduser("~"))
+    if _can_be_made(Path(environment.get("XDG_CACHE_HOME") or home / ".cache")):
+        return
+    folder = tempfile.mkdtemp(prefix=FOR_ONCE)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    environment[CACHE_VARIABLE] = folder
+    talk.detail(f"compiled code cannot be kept: set {CACHE_VARIABLE} to a folder for it")
+
+
+def compiled_note(seconds: float, environment: Mapping[str, str] = os.environ) -> str:
+    """What to say of the time that compiling took."""
+    for_once = Path(environment.get(CACHE_VARIABLE, "")).name.startswith(FOR_ONCE)
+    later = f"set {CACHE_VARIABLE} to keep that" if for_once else "later runs start at once"
+    return f"compiled for this machine in {seconds:.0f} s; {later}"
+
+
+def _can_be_made(folder: Path) -> bool:
+    """Whether the folder, or the nearest one above it that exists, can be written."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
