@@ -29,9 +29,9 @@ def insert_tracked(
 ) -> None:
     """Let the clusters of one scan, already in the map frame (2), change the map."""
     last = curve_map.tracks
-    centroids = cluster_centroids(points, starts)  # (4)
+    centroids = cluster_centroids(points, starts)  # eq. (4)
     reach_m = settings.association.track_dist * curve_map.knot_step_m
-    tracked = track_clusters(centroids, last, reach_m)  # (5)
+    tracked = track_clusters(centroids, last, reach_m)  # eq. (5)
     curves, starts_m = np.full(len(centroids), -1), np.zeros(len(centroids))
     for c, (begin, end) in enumerate(pairwise(starts)):
         cluster = points[begin:end]
@@ -43,10 +43,10 @@ def insert_tracked(
             start_m = float(last.starts_m[tracked[c]])
             scan_curve = _fit_on(curve_map, index, cluster, start_m, settings)
         if scan_curve is not None:
-            curves[c] = merge_curve(curve_map, index, scan_curve, settings.merging)  # (13)
+            curves[c] = merge_curve(curve_map, index, scan_curve, settings.merging)  # eq. (13)
         else:
             scan_curve = _fit(curve_map, cluster, 0.0, settings)  # tau_1 = 0
-            curves[c] = merge_curve(curve_map, -1, scan_curve, settings.merging)  # (12)
+            curves[c] = merge_curve(curve_map, -1, scan_curve, settings.merging)  # eq. (12)
         starts_m[c] = scan_curve.tau_start_m
     kept = curves >= 0
     curve_map.tracks = Tracks(centroids[kept], curves[kept], starts_m[kept])
@@ -56,8 +56,8 @@ def _fit_on(
     curve_map: CurveMap, index: int, cluster: Points, start_m: float, settings: MappingSettings
 ) -> Curve | None:
     """The cluster's curve on the lattice of a map curve; None where the two do not overlap."""
-    scan_curve = _fit(curve_map, cluster, start_m, settings)  # (6)-(8) with (7) from the last tau_1
-    shift_m = align_offset(curve_map.curve(index), scan_curve, settings.alignment)  # (9)-(11)
+    scan_curve = _fit(curve_map, cluster, start_m, settings)  # eqs. (6)-(8)
+    shift_m = align_offset(curve_map.curve(index), scan_curve, settings.alignment)  # eqs. (9)-(11)
     return None if shift_m is None else _fit(curve_map, cluster, start_m + shift_m, settings)
 
 

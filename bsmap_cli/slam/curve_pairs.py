@@ -89,9 +89,9 @@ def pair_by_centroids(
     if last is None:
         return pairs
     step = curve_map.knot_step_m
-    means = cluster_centroids(clusters.points, clusters.starts)  # (4)
+    means = cluster_centroids(clusters.points, clusters.starts)  # eq. (4)
     means = SE2.from_array(pose).transform(means)
-    tracked = track_clusters(means, last, settings.association.track_dist * step)  # (5)
+    tracked = track_clusters(means, last, settings.association.track_dist * step)  # eq. (5)
     for c, (begin, end) in enumerate(pairwise(clusters.starts)):
         if tracked[c] >= 0 and end - begin > curve_map.degree:
             start_m = float(last.starts_m[tracked[c]])  # the last tau_1 is the first guess
