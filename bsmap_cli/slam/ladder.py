@@ -47,9 +47,22 @@ def track_down(
 ) -> RegistrationResult:
     """Register the scan that follows the last one, by the method that is set.
 
-    Where curves are registered to curves, the points say in the end how well the pose fits.
+    Scans that follow each other closely begin within reach of the finest level, and most end
+    there. Where curves are registered to curves, the points say in the end how well the pose fits.
     """
     method = settings.registration.method
+    if method == "points":
+        quick = register(
+            levels[-1],
+            clusters[-1],
+            start_pose,
+            prior_pose,
+            prior_information,
+            sigma_m=sigma_m,
+            settings=settings.registration,
+        )
+        if quick.inlier_ratio >= settings.registration.shortcut and not quick.degenerate:
+            return quick
     by_curves = {"points": 0, "joint_first": 1}.get(method, len(levels))
     pose = start_pose
     for level, seen in zip(levels[:by_curves], clusters[:by_curves], strict=True):

@@ -33,6 +33,7 @@ SHARED = 10.0  # neighbouring points err alike: so many count as one against the
 TANGENT_NOISE = (
     0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
 )
+STILL = 5e-3  # a smaller step ends the iteration [knot steps]; the next would be its square
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
@@ -54,6 +55,12 @@ class RegistrationSettings:
     )
     inlier: float = setting(
         0.5, "a matched point counts as inlier, not below 3 sigma [knot steps]", minimum=0.0
+    )
+    shortcut: float = setting(
+        0.9,
+        "share of points that must lie on the finest level, from the prediction on, to leave the "
+        "coarser levels out; above 1: never",
+        minimum=0.0,
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
     degenerate: float = setting(
@@ -268,7 +275,7 @@ def _register(
         for i in range(3):
             pose[i] += delta[i]
         moved = math.hypot(delta[0], delta[1]) + lever * abs(delta[2])
-        if moved < 1e-3 * knot_step_m:
+        if moved < STILL * knot_step_m:
             break
     return steps, found
 

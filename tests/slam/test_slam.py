@@ -52,7 +52,7 @@ def test_room_and_wall_without_odometry(scene, seed):
     assert result.figures["tracking_lost"] == []
     assert result.figures["degenerate_share"] < 0.05
     assert np.array_equal(result.trajectory.stamps_ns, sim.truth.stamps_ns)
-    assert [level.knot_step_m for level in result.document.levels] == [0.4, 0.2, 0.1]
+    assert [level.knot_step_m for level in result.document.levels] == [0.1]
 
 
 def test_a_corridor_with_odometry_is_no_worse_than_odometry_along_and_sharp_across():
