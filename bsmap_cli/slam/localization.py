@@ -8,6 +8,7 @@ that fails, the search begins anew.
 
 from __future__ import annotations
 
+import math
 from array import array
 from dataclasses import dataclass, replace
 
@@ -27,11 +28,15 @@ from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
 from bsmap_cli.slam.prediction import Cadence, Predictor
+from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.uncertainty import isotropic_information
 
-WITNESSES = 8  # keyframes that must agree with a place, the newest ones
-AGREEING = 0.75  # of them
+WITNESSES = 10  # keyframes, the newest ones, that are asked whether they fit a place
+AGREEING = 0.75  # of them must
+FEWEST_AT_FIRST = 3  # a robot outside of the map may see what looks like a part of it
+STRAYED_STEPS, STRAYED_SHARE = 10.0, 0.1  # what a bridge may err: finest knot steps, of its way
+EXPECTED_STEPS = 2.0  # from the prediction, a bad match is believed [finest knot steps]
 SUSPICIOUS = 0.04  # of a scan's points that fit the map usually, and now do not
 MEMORY = 0.02  # share of the newest scan in what is usual
 PATIENCE_SHARE = 8  # a search that failed is repeated once this share more has been seen
@@ -65,7 +70,7 @@ class Localizer:
         self._converged: int | None = None
         self._lost_scans = self._lost_in_a_row = 0
         self._pose = SE2.identity()
-        self._usual_ratio = 0.0
+        self._usual_ratio = 1.0
         self._cadence = Cadence()
         self._predictor = Predictor(self.settings.prediction, self.settings.ladder[-1])
         self._begin_seeking()
@@ -81,7 +86,9 @@ class Localizer:
             self._seek(self._local, scan, clusters)
 
     def finish(self) -> Localized:
-        """All poses, once the log has ended."""
+        """All poses, once the log has ended; then a place that few scans tell of is good enough."""
+        if self._converged is None and self._candidate is not None:
+            self._settle(*self._candidate)
         poses = np.array(self._poses, np.float64).reshape(-1, 3)
         stamps = np.array(self._stamps_ns, np.int64)
         return Localized(Trajectory(stamps, poses), self._converged, self._lost_scans)
@@ -100,21 +107,31 @@ class Localizer:
             settings=self._wary(),
         )
         told = result.points >= FEWEST_POINTS
-        lost = told and result.inlier_ratio < self.settings.recovery.lost_below
-        pose = self._pose @ prediction.step
+        pose, found = self._pose @ prediction.step, SE2.from_array(result.pose)
+        lost = told and not self._credible(result, pose.inverse() @ found)
         if told and not lost:
-            pose = SE2.from_array(result.pose)
-            memory = MEMORY if self._usual_ratio else 1.0
-            self._usual_ratio += memory * (result.inlier_ratio - self._usual_ratio)
+            pose = found
+            self._usual_ratio += MEMORY * (result.inlier_ratio - self._usual_ratio)
         measured = told and not lost and not result.degenerate
         step = self._pose.inverse() @ pose
         self._predictor.observe(step, scan.pose_odom_base, measured=measured)
         self._pose = pose
         self._poses.extend(pose.as_array())
         self._lost_in_a_row = self._lost_in_a_row + 1 if lost else 0
-        self._lost_scans += lost
+        self._lost_scans += int(lost)
         if self._lost_in_a_row >= self.settings.recovery.patience:
             self._begin_seeking()
+
+    def _credible(self, result: RegistrationResult, gap: SE2) -> bool:
+        """Whether a match may be the place, `gap` away from the predicted one.
+
+        At the edge of the map a search finds poses that fit a little better than none: what fits
+        badly must lie where the robot was expected.
+        """
+        recovery, unit = self.settings.recovery, self.settings.ladder[-1]
+        if math.hypot(gap.x, gap.y) > EXPECTED_STEPS * unit:
+            return result.inlier_ratio >= recovery.search_below
+        return result.inlier_ratio >= recovery.lost_below
 
     def _wary(self) -> SlamSettings:
         """Settings that search as soon as a scan fits the map less well than usual.
@@ -135,6 +152,7 @@ class Localizer:
         self._seen_from = len(self._stamps_ns)
         self._local_poses: list[SE2] = []
         self._next_search = 1
+        self._candidate: tuple[SE2, SE2] | None = None
 
     def _seek(self, local: LocalSlam, scan: Scan, clusters: list[Clusters]) -> None:
         """Go on with the small map; search the old one for it whenever it has grown."""
@@ -145,7 +163,7 @@ class Localizer:
         )
         self._local_poses.append(tracked.pose_local)
         self._poses.extend((self._pose_map_local @ tracked.pose_local).as_array())
-        self._lost_scans += self._converged is not None
+        self._lost_scans += int(self._converged is not None)
         seen = len(local.keyframes)
         if tracked.keyframe is None or seen < self._next_search:
             return
@@ -172,7 +190,22 @@ class Localizer:
         witnesses = [local.keyframes[k] for k in local.older.keyframes[-WITNESSES:]]
         found = [self._placed(keyframe, pose_map_local) for keyframe in witnesses]
         agreeing = sum(pose is not None for pose in found)
-        return found[-1] if agreeing >= AGREEING * len(witnesses) else None
+        here = found[-1]
+        if here is None or agreeing < AGREEING * len(witnesses):
+            return None
+        self._candidate = here, pose_local
+        return here if agreeing >= self._wanted_witnesses(here @ pose_local.inverse()) else None
+
+    def _wanted_witnesses(self, pose_map_local: SE2) -> int:
+        """Keyframes that must fit: few where the way from the last place leads there as well."""
+        if self._converged is None:
+            return FEWEST_AT_FIRST
+        steps = np.diff([[pose.x, pose.y] for pose in self._local_poses], axis=0)
+        way_m = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+        here = self._local_poses[-1]
+        gap = (self._pose_map_local @ here).inverse() @ (pose_map_local @ here)
+        allowed_m = STRAYED_STEPS * self.settings.ladder[-1] + STRAYED_SHARE * way_m
+        return 1 if math.hypot(gap.x, gap.y) <= allowed_m else WITNESSES
 
     def _placed(self, keyframe: Keyframe, pose_map_local: SE2) -> SE2 | None:
         """A keyframe's pose on the map near where a search puts it, if it fits there."""
