@@ -87,6 +87,8 @@ class Localizer:
 
     def finish(self) -> Localized:
         """All poses, once the log has ended; then a place that few scans tell of is good enough."""
+        if self._local_poses and self._local and self._next_search == FEWEST_AT_FIRST:
+            self._find(self._local, self._local_poses[-1])
         if self._converged is None and self._candidate is not None:
             self._settle(*self._candidate)
         poses = np.array(self._poses, np.float64).reshape(-1, 3)
@@ -151,7 +153,7 @@ class Localizer:
         self._pose_map_local = self._pose  # as far as is known
         self._seen_from = len(self._stamps_ns)
         self._local_poses: list[SE2] = []
-        self._next_search = 1
+        self._next_search = FEWEST_AT_FIRST if self._converged is None else 1
         self._candidate: tuple[SE2, SE2] | None = None
 
     def _seek(self, local: LocalSlam, scan: Scan, clusters: list[Clusters]) -> None:
