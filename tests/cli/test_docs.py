@@ -22,6 +22,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 WRITES = {
     "slam": {"-o", "--traj"},
     "map": {"-o", "--traj"},
+    "localize": {"--traj"},
     "sim": {"-o", "--truth", "--surfaces"},
 }
 
