@@ -109,6 +109,16 @@ def _gather(
     return count
 
 
+def used_beams(scan: Scan, settings: SensorSettings) -> NDArray[np.bool_]:
+    """(n,) bool: beams outside the sectors in which the robot sees itself."""
+    return _beam_table(
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        len(scan.ranges_m),
+        settings.ignore_angles_deg,
+    )[2]
+
+
 def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tuple[float, float]:
     """Shortest and longest range [m] that counts as a return of this scan."""
     far = scan.range_max_m * NO_RETURN_SHARE
@@ -123,7 +133,7 @@ def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tu
 def find_returns(
     scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector | None = None
 ) -> Returns:
-    """The returns of a scan; `twist_body` (vx, vy [m/s], omega [rad/s]) undoes the sweep's motion."""
+    """The returns; `twist_body` (vx, vy [m/s], omega [rad/s]) undoes the motion of the sweep."""
     beams = len(scan.ranges_m)
     cosines, sines, used = _beam_table(
         scan.angle_min_rad, scan.angle_increment_rad, beams, settings.ignore_angles_deg

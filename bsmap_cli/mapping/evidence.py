@@ -1,0 +1,145 @@
+"""Remove what the world no longer shows: hits and misses of all views, weighed in order of time.
+
+Each span has a score: up by one for a view that hits it, down by one for a view that looks
+through it. It is bounded above, so that what has gone goes from the map after a few misses however
+often it was hit before, and farther below, so that what passes through a place that was long seen
+empty leaves no trace, but what came to stay does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.level_arrays import LevelArrays
+from bsmap_cli.mapping.trimming import remove_points
+from bsmap_cli.mapping.visibility import DARK, HIT, MISS, Look, look_at
+from bsmap_cli.sensor.sight import Sight
+from bsmap_cli.settings import setting
+
+ABSENT = -1.0  # a span whose score ends here or below is not there
+DARK_MISS = 0.5  # nothing returned: a miss, or a surface that does not return every beam
+DARK_COSINE, DARK_RANGE = 0.5, 0.95  # where it counts at all against what was hardly ever hit
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VisibilitySettings:
+    """What becomes of curves that later scans look through."""
+
+    method: str = setting(
+        "evidence",
+        "weigh all views when the map is finished; lower weights by each miss as scans come; "
+        "or keep all",
+        choices=("evidence", "fade", "off"),
+    )
+    leaving: float = setting(
+        10.0, "misses in a row after which what was surely there has gone", minimum=1.0
+    )
+    arriving: float = setting(
+        40.0, "hits in a row after which what was surely not there stands", minimum=1.0
+    )
+    tentative: int = setting(
+        3, "what fewer views have hit is contradicted by any view, else by similar ones", minimum=0
+    )
+
+
+class Tally(NamedTuple):
+    """What is known of each span, by row.
+
+    score : see above; hits : views that hit it; least_cosine, farthest_m : the flattest incidence
+    and the longest beam among these.
+    """
+
+    score: Vector
+    hits: Vector
+    least_cosine: Vector
+    farthest_m: Vector
+
+
+def remove_unseen(
+    curve_map: CurveMap,
+    sights: Sequence[Sight],
+    poses: Points,
+    *,
+    sigma_m: float,
+    settings: VisibilitySettings,
+    min_length: float,
+) -> None:
+    """Remove the parts of curves that the views at `poses` (n, 3), in order of time, contradict.
+
+    A control point goes when all spans that it shapes are absent. `min_length` : what is left of
+    a curve and shorter goes too [knot steps].
+    """
+    arrays = curve_map.arrays
+    rows = int(arrays.sizes[1])
+    tally = Tally(np.zeros(rows), np.zeros(rows), np.full(rows, math.inf), np.zeros(rows))
+    looks = []
+    for sight, pose in zip(sights, poses, strict=True):
+        look = look_at(curve_map, sight, pose, sigma_m)
+        _count_hits(look, tally)
+        looks.append(look)
+    for sight, look in zip(sights, looks, strict=True):
+        _weigh(look, sight.reach_m, tally, settings.leaving, settings.arriving, settings.tentative)
+    gone = np.zeros(rows, bool)
+    if _gone_points(arrays, curve_map.degree, tally.score <= ABSENT, gone):
+        remove_points(curve_map, gone, min_length=min_length)
+
+
+@njit(cache=True)
+def _count_hits(look: Look, tally: Tally) -> None:
+    """From where each span returns a beam: a glass pane does so only along its normal."""
+    for i in range(len(look.rows)):
+        if look.verdicts[i] == HIT:
+            row = look.rows[i]
+            tally.hits[row] += 1.0
+            tally.least_cosine[row] = min(tally.least_cosine[row], look.cosines[i])
+            tally.farthest_m[row] = max(tally.farthest_m[row], look.ranges_m[i])
+
+
+@njit(cache=True)
+def _weigh(
+    look: Look, reach_m: float, tally: Tally, leaving: float, arriving: float, tentative: int
+) -> None:
+    """Let one view change the scores."""
+    for i in range(len(look.rows)):
+        row, verdict = look.rows[i], look.verdicts[i]
+        if verdict == HIT:
+            tally.score[row] = min(leaving, tally.score[row] + 1.0)
+            continue
+        cosine, r = look.cosines[i], look.ranges_m[i]
+        counts = cosine >= tally.least_cosine[row] and r <= tally.farthest_m[row]
+        if tally.hits[row] < tentative:
+            sure = cosine >= DARK_COSINE and r <= DARK_RANGE * reach_m
+            counts = counts or verdict == MISS or sure
+        if counts:
+            miss = DARK_MISS if verdict == DARK else 1.0
+            tally.score[row] = max(-arriving, tally.score[row] - miss)
+
+
+@njit(cache=True)
+def _gone_points(level: LevelArrays, degree: int, absent: Flags, gone: Flags) -> bool:
+    """Mark the control points all of whose spans are absent, or not indexed; is there any?"""
+    found = False
+    for curve in range(level.sizes[0]):
+        offset, count = level.offset[curve], level.count[curve]
+        last = offset + count - degree - 1
+        for row in range(offset, offset + count):
+            contradicted = False
+            kept = False
+            for span in range(max(offset, row - degree), min(last, row) + 1):
+                if absent[span]:
+                    contradicted = True
+                elif level.span_cell[span] >= 0:
+                    kept = True
+            gone[row] = contradicted and not kept
+            found = found or gone[row]
+    return found
