@@ -9,7 +9,7 @@ their coefficients, worked out once from the recursion, serves every degree alik
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache
 from math import comb, factorial
 
 import numpy as np
@@ -20,9 +20,9 @@ Matrix = NDArray[np.float64]
 MIN_DEGREE, MAX_DEGREE = 2, 5
 
 
-@lru_cache(maxsize=None)
+@cache
 def basis_matrix(degree: int) -> Matrix:
-    """(d + 1, d + 1) float64 M: the weight of control point g = k - d + a at f is sum_p M[a, p] f^p.
+    """(d + 1, d + 1) float64 M: control point g = k - d + a weighs sum_p M[a, p] f^p at f.
 
     Follows from the recursion of eq. (1), its second denominator corrected to
     t_(j+r+1) - t_(j+1), on integer knots: beta_d(x) = sum_j (-1)^j C(d+1, j) (x - j)_+^d / d!.

@@ -53,7 +53,7 @@ class Curve:
             powers[:, p] = falling * f ** (p - derivative)
         weights = powers @ basis_matrix(self.degree).T / self.knot_step_m**derivative
         active = self.control_points[span[:, None] + np.arange(self.degree + 1)]
-        return np.einsum("ma,mac->mc", weights, active)
+        return np.asarray(np.einsum("ma,mac->mc", weights, active))
 
     def transformed(self, pose_a_b: SE2) -> Curve:
         """The curve in the outer frame: exact, because the basis functions sum to one."""

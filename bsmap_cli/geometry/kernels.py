@@ -131,7 +131,7 @@ def solve_banded(band: Array, rhs: Array) -> bool:
 
 
 @njit(cache=True)
-def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:
+def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:  # noqa: PLR0912
     """Eigenvalues (ascending) and eigenvectors (columns) of a symmetric 3 x 3 matrix, by Jacobi."""
     a = matrix.copy()
     vectors[:] = 0.0

@@ -2,7 +2,7 @@
 
 A wall seen first in pieces leaves curves that overlap or follow one another. The lighter of two
 that run together gives way where the heavier covers it; where one then begins at the other's end,
-it is sampled and fitted on the other's lattice, as their offsets differ by no whole number of knots.
+it is sampled and fitted on the other's lattice: their offsets differ by no whole knots.
 """
 
 from __future__ import annotations
@@ -117,7 +117,8 @@ def _absorb(level: LevelArrays, matrix: Points, knot_step_m: float, least: float
     for c in range(curves):
         length = level.support[c, 1] - level.support[c, 0]
         heaviness[c] = _mean_weight(level, c) * length if level.count[c] > 0 else 0.0
-    for curve in np.argsort(heaviness, kind="mergesort"):
+    order = np.argsort(heaviness, kind="mergesort")
+    for curve in order:
         if level.count[curve] == 0:
             continue
         start, end = level.support[curve, 0], level.support[curve, 1]
@@ -160,7 +161,7 @@ def _ends(curve_map: CurveMap) -> tuple[NDArray[np.int64], Points, Points]:
     arrays = curve_map.arrays
     live = np.flatnonzero(arrays.count[: len(curve_map)] > 0)
     points, tangents = np.empty((len(live), 2, 2)), np.empty((len(live), 2, 2))
-    for k, curve in enumerate(live):
+    for k, curve in enumerate(live.tolist()):
         u = arrays.support[curve].copy()
         sample_curve(arrays, curve_map.matrix, curve, u, points[k], tangents[k])
     return live, points, tangents
@@ -220,7 +221,7 @@ def _followers(curve_map: CurveMap) -> list[tuple[float, int, int, float]]:
     reach = step * math.hypot(JOIN_STEPS, JOIN_ASIDE)
     near = cKDTree(points[:, 0]).query_ball_point(points[:, 1], reach, return_sorted=True)
     found = []
-    for i, starts in enumerate(near):
+    for i, starts in enumerate(np.asarray(near, object).tolist()):
         for j in starts:
             gap, (tx, ty) = points[j, 0] - points[i, 1], tangents[i, 1]
             along = float(gap[0] * tx + gap[1] * ty)

@@ -13,26 +13,25 @@ from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.centroid_tracking import Tracks
 from bsmap_cli.mapping.level_arrays import LevelArrays
-from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.span_index import EMPTY, insert_span, remove_span
 
 USABLE_WEIGHT = 0.02  # of all control points of a span that is matched against: the last full span
 
 
 def _empty_level(curves: int, rows: int, cells: int) -> LevelArrays:
-    integers = [np.zeros(curves, np.int64) for _ in range(6)]
+    names = ("first", "count", "offset", "low", "high", "seen")
     return LevelArrays(
-        np.zeros(4, np.int64),
-        *integers,
-        np.zeros((curves, 2)),
-        np.zeros((rows, 2)),
-        np.zeros(rows),
-        np.full(rows, -1),
-        np.zeros((rows, 4)),
-        np.full(rows, -1),
-        np.full(rows, -1),
-        np.full(cells, EMPTY),
-        np.full(cells, -1),
+        sizes=np.zeros(4, np.int64),
+        **{name: np.zeros(curves, np.int64) for name in names},
+        support=np.zeros((curves, 2)),
+        points=np.zeros((rows, 2)),
+        weights=np.zeros(rows),
+        owner=np.full(rows, -1),
+        spans=np.zeros((rows, 4)),
+        next_span=np.full(rows, -1),
+        span_cell=np.full(rows, -1),
+        cell_keys=np.full(cells, EMPTY),
+        cell_heads=np.full(cells, -1),
     )
 
 

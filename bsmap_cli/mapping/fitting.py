@@ -88,7 +88,7 @@ def fit_rms(
 
 
 @njit(cache=True)
-def fit_control_points(
+def fit_control_points(  # noqa: PLR0912
     u: Vector,
     points: Points,
     weights: Vector,

@@ -10,7 +10,7 @@ from bsmap_cli.mapping.map_document import TENTATIVE, MapLevel
 
 
 def freeze_level(curve_map: CurveMap, *, max_weight: int, min_seen: int = 1) -> MapLevel:
-    """The curves of one knot step as a `MapLevel`; those seen less than `min_seen` times are tentative."""
+    """The curves of one knot step as a `MapLevel`; rarely seen ones (`min_seen`) tentative."""
     arrays, degree, step = curve_map.arrays, curve_map.degree, curve_map.knot_step_m
     columns: dict[str, list[float]] = {
         name: [] for name in ("id", "start", "end", "flags", "seen", "first", "count")

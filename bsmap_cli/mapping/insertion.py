@@ -17,7 +17,7 @@ from bsmap_cli.mapping.tracked_insertion import insert_tracked
 def rotate(pose: Vector, vectors: Points) -> Points:
     """(n, 2) directions of the inner frame, in the outer one."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    return vectors @ np.array([[cos, sin], [-sin, cos]])
+    return np.asarray(vectors @ np.array([[cos, sin], [-sin, cos]]))
 
 
 def insert_clusters(

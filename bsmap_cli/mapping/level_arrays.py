@@ -26,7 +26,7 @@ class LevelArrays(NamedTuple):
 
     sizes: Integers
     first: Integers
-    count: Integers
+    count: Integers  # type: ignore[assignment]
     offset: Integers
     low: Integers
     high: Integers

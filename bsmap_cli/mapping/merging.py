@@ -60,7 +60,7 @@ class MergingSettings:
 @njit(cache=True)
 def has_room(level: LevelArrays, rows: int) -> bool:
     """Can a curve grow or start that needs `rows` rows?"""
-    return (
+    return bool(
         level.sizes[1] + rows <= len(level.weights)
         and level.sizes[0] + 1 < len(level.first)
         and 2 * (level.sizes[2] + rows) <= len(level.cell_keys)
@@ -81,7 +81,7 @@ def _claim_rows(level: LevelArrays, curve: int, first: int, count: int) -> int:
     for row in range(low, level.high[curve]):
         level.owner[row] = curve
         level.span_cell[row] = -1
-    return low + slack
+    return int(low + slack)
 
 
 @njit(cache=True)
@@ -111,7 +111,7 @@ def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
         level.weights[row] = 0.0
     for row in range(offset + old_first - new_first + old_count, offset + new_count):
         level.weights[row] = 0.0
-    return moved
+    return bool(moved)
 
 
 @njit(cache=True)
@@ -124,7 +124,7 @@ def _start_curve(level: LevelArrays, first: int, count: int) -> int:
     level.support[curve, 0] = math.inf
     level.support[curve, 1] = -math.inf
     level.seen[curve] = 0
-    return curve
+    return int(curve)
 
 
 @njit(cache=True)
@@ -229,6 +229,8 @@ def merge_run(
     fitted, omega = np.empty((count, 2)), np.empty(count)
     if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):
         return False
+    if fit_rms(u, points, weights, matrix, low, fitted) > roughest_m:
+        return False
     observed_share(u, weights, matrix, low, omega)
     merge_fitted(
         level,
@@ -251,7 +253,7 @@ def _advance(points: Points, tangents: Points, j: int) -> float:
     """Way [m] from point j - 1 to j along the smoothed direction: noise does not lengthen it."""
     dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
     tx, ty = tangents[j, 0] + tangents[j - 1, 0], tangents[j, 1] + tangents[j - 1, 1]
-    return (dx * tx + dy * ty) / (math.hypot(tx, ty) + 1e-300)
+    return float((dx * tx + dy * ty) / (math.hypot(tx, ty) + 1e-300))
 
 
 @njit(cache=True)
@@ -321,7 +323,7 @@ def merge_runs(
     roughest_m: float,
     by_table: bool,
 ) -> int:
-    """Merge the runs from `resume` on; returns the first one that finds no room, or their number."""
+    """Merge the runs from `resume` on; the first one that finds no room, or their number."""
     for r in range(resume, len(runs)):
         begin, end = runs[r, BEGIN], runs[r, END]
         curve = runs[r, CURVE]

@@ -35,7 +35,7 @@ def _same_run(u: Vector, points: Points, last: int, j: int, knot_step_m: float) 
     """Does matched point j go on where `last` was: forward by about the way between them?"""
     way = math.hypot(points[j, 0] - points[last, 0], points[j, 1] - points[last, 1]) / knot_step_m
     advance = u[j] - u[last]
-    return -0.5 <= advance <= 1.5 * way + 0.5
+    return bool(-0.5 <= advance <= 1.5 * way + 0.5)
 
 
 @njit(cache=True)

@@ -115,7 +115,7 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
         document,
         trajectory,
         figures=result.figures,
-        stage_seconds={"register": seconds.pop("track", 0.0), **seconds},
+        stage_seconds=seconds,
         losses=(f"tracking was lost and started again ({lost} times)",) if lost else (),
     )
 

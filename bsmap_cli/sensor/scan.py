@@ -36,6 +36,6 @@ class Scan:
     range_min_m: float = 0.0
     range_max_m: float = float("inf")
     time_increment_s: float = 0.0
-    pose_base_laser: SE2 = SE2(0.0, 0.0, 0.0)
+    pose_base_laser: SE2 = SE2(0.0, 0.0, 0.0)  # noqa: RUF009 (frozen)
     pose_odom_base: SE2 | None = None
     topic: str = ""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """stamps_ns : (m,) int64, in the order of the log; poses : (m, 3) float64 x, y [m], yaw [rad]."""
+    """stamps_ns : (m,) int64, in log order; poses : (m, 3) float64 x, y [m], yaw [rad]."""
 
     stamps_ns: NDArray[np.int64]
     poses: NDArray[np.float64]

@@ -45,7 +45,7 @@ def _project(
         tx = cos * tangents[j, 0] - sin * tangents[j, 1]
         ty = sin * tangents[j, 0] + cos * tangents[j, 1]
         turn = math.atan2(ty, tx) / (0.5 * math.pi)
-        cells[j, 2] = int(math.floor(turn + 0.5)) % CHANNELS
+        cells[j, 2] = math.floor(turn + 0.5) % CHANNELS
 
 
 @njit(cache=True)
@@ -152,7 +152,7 @@ def _search(
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Where to look: `centre` (3,) in the submap frame, half widths [m] and [rad] (pi: all round)."""
+    """Where to look: `centre` (3,) in the submap frame, half widths [m], [rad] (pi: all round)."""
 
     centre: Vector
     reach_m: float

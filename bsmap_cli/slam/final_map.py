@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.curve_map import CurveMap

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,7 @@ class LocalSlam:
     submaps: list[Submap] = field(default_factory=list)
     keyframes: list[Keyframe] = field(default_factory=list)
     finished: int = 0
+    merge_seconds: float = 0.0
     _pose: SE2 = field(default_factory=SE2.identity)
     _lost_scans: int = 0
     _coasted_m: float = 0.0
@@ -128,8 +130,10 @@ class LocalSlam:
         )
         self.keyframes.append(keyframe)
         self._coasted_m = 0.0
+        began = time.perf_counter()
         for submap in self.submaps[self.finished :]:
             submap.insert(keyframe.index, clusters, submap.to_submap(self._pose))
+        self.merge_seconds += time.perf_counter() - began
         full = self.settings.submaps.keyframes
         if len(self.older.keyframes) >= full and len(self.submaps) > self.finished + 1:
             self.finished += 1

@@ -109,6 +109,8 @@ class LoopCloser:
             reach_rad = settings.deviations * float(radians[submap.index])
             reach_m = min(reach_m, settings.max_reach * unit)
             seen = self.graph.poses[submap.index].inverse() @ here
+            if math.hypot(seen.x, seen.y) > submap.extent_m + view_m + reach_m:
+                continue
             distance = min(math.hypot(x - seen.x, y - seen.y) for x, y in submap.viewpoints[::4])
             if distance < view_m + reach_m:
                 found.append((distance / (view_m + reach_m), submap, reach_m, reach_rad))

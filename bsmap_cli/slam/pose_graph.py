@@ -46,7 +46,7 @@ class EdgeList:
 
 @dataclass(frozen=True, slots=True)
 class Optimised:
-    """poses : (n, 3) of the nodes; loop_weights : final weight of each loop edge, in their order."""
+    """poses : (n, 3) of the nodes; loop_weights : final weight of each loop edge, in order."""
 
     poses: Points
     loop_weights: Vector

@@ -26,13 +26,13 @@ class PredictionSettings:
     )
     motion_sigma: float = setting(
         0.3,
-        "of constant velocity at first; then what it was seen to be [finest knot steps]",
+        "of constant velocity at first, then what it is seen to be [finest knot steps]",
         minimum=0.0,
     )
     motion_sigma_deg: float = setting(2.0, "of constant turn rate, at first", minimum=0.0)
     motion_floor: float = setting(
         0.05,
-        "both never sink below this [finest knot steps], the angle not below a tenth of its first value",
+        "neither sinks below this [finest knot steps], or a tenth of the first angle",
         minimum=0.0,
     )
     motion_margin: float = setting(

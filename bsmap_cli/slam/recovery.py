@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting

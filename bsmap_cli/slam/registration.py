@@ -18,7 +18,6 @@ from bsmap_cli.geometry.kernels import (
     foot_point,
     polynomial_jet,
     solve3,
-    span_polynomial,
     symmetric_eigen3,
 )
 from bsmap_cli.geometry.se2 import Points, Vector
@@ -91,7 +90,7 @@ class RegistrationResult:
 
 
 @njit(cache=True)
-def _accumulate(
+def _accumulate(  # noqa: PLR0915
     level: LevelArrays,
     matrix: Points,
     knot_step_m: float,

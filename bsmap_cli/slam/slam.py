@@ -63,7 +63,14 @@ class Slam:
         self._degenerate = 0
         self._was_lost = False
         self._last_stamp_ns = 0
-        self.seconds = {"fit": 0.0, "track": 0.0, "loops": 0.0, "graph": 0.0, "final_map": 0.0}
+        self.seconds = {
+            "fit": 0.0,
+            "register": 0.0,
+            "merge": 0.0,
+            "loops": 0.0,
+            "graph": 0.0,
+            "final_map": 0.0,
+        }
 
     def process(self, scan: Scan) -> None:
         """Track one scan, insert it if it is a keyframe, and look for loops."""
@@ -84,7 +91,9 @@ class Slam:
         tracked = local.process(index, scan.stamp_ns, clusters, scan.pose_odom_base)
         done = time.perf_counter()
         self.seconds["fit"] += segmented - started
-        self.seconds["track"] += done - segmented
+        merged = local.merge_seconds - self.seconds["merge"]
+        self.seconds["merge"] += merged
+        self.seconds["register"] += done - segmented - merged
         self._log.add(scan.stamp_ns, len(local.keyframes) - 1, tracked.pose_local)
         self._degenerate += tracked.degenerate
         self._note_loss(tracked.lost, scan.stamp_ns)

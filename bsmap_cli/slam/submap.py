@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from bsmap_cli.geometry.se2 import SE2
@@ -26,7 +27,7 @@ class Submap:
     """Curves in the frame of the submap's first keyframe, one map a knot step, coarse to fine.
 
     pose_local : the submap in the local frame of tracking, which drifts.
-    viewpoints : where its keyframes stood, submap frame [m].
+    viewpoints : where its keyframes stood, submap frame [m]; none is farther out than `extent_m`.
     """
 
     def __init__(self, index: int, pose_local: SE2, settings: MappingSettings) -> None:
@@ -35,6 +36,7 @@ class Submap:
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self.keyframes: list[int] = []
         self.viewpoints: list[tuple[float, float]] = []
+        self.extent_m = 0.0
         self._settings = settings
         self._likelihood: tuple[int, Likelihood] | None = None
 
@@ -49,6 +51,7 @@ class Submap:
             insert_clusters(level, seen, pose, self._settings)
         self.keyframes.append(keyframe)
         self.viewpoints.append((pose_submap_base.x, pose_submap_base.y))
+        self.extent_m = max(self.extent_m, math.hypot(pose_submap_base.x, pose_submap_base.y))
 
     def likelihood(self, *, cell_m: float, heights: int) -> Likelihood:
         """What searches look at, for the curves as they stand; kept until they change."""

@@ -44,7 +44,7 @@ class SubmapGraph:
         if begun or self._urgent:
             self._deviations.clear()
             if self._stale:
-                self._optimise()
+                self._optimise(rounds=6 if self._urgent else 1)
             self._stale = self._urgent = False
 
     def add_loop(self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool) -> None:
@@ -70,14 +70,17 @@ class SubmapGraph:
         metres = [link[0] for link in self._links] + [match[0]] * len(self._loops)
         radians = [link[1] for link in self._links] + [match[1]] * len(self._loops)
         graph = {}
-        for name, values in (("m", metres), ("rad", radians)):
+        for name, deviations in (("m", metres), ("rad", radians)):
             lightest: dict[tuple[int, int], float] = {}
-            for i, j, value in zip(first, second, values, strict=True):
+            for i, j, value in zip(first, second, deviations, strict=True):
                 key = (min(i, j), max(i, j))
                 lightest[key] = min(value, lightest.get(key, math.inf))
-            rows, columns = zip(*lightest, strict=True) if lightest else ((), ())
-            matrix = coo_matrix((list(lightest.values()), (rows, columns)), shape=(n, n))
-            graph[name] = dijkstra(matrix.tocsr(), directed=False, indices=submap)
+            pairs = np.array(list(lightest), np.int64).reshape(-1, 2)
+            values = np.array(list(lightest.values()), np.float64)
+            matrix = coo_matrix((values, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+            graph[name] = np.asarray(
+                dijkstra(matrix.tocsr(), directed=False, indices=np.array([submap]))
+            )[0]
         return graph["m"], graph["rad"]
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
@@ -97,7 +100,8 @@ class SubmapGraph:
         unit = local.settings.ladder[-1]
         return way_deviation(way, unit, coasted_m=coasted, weak=weak)
 
-    def _optimise(self) -> None:
+    def _optimise(self, rounds: int) -> None:
+        """Solve anew; where nothing moved much, the sceptical kernel alone will do."""
         edges = EdgeList()
         for k, deviation in enumerate(self._links):
             submaps = self._local.submaps
@@ -112,4 +116,4 @@ class SubmapGraph:
                 loop=True,
             )
         poses = np.array([pose.as_array() for pose in self.poses])
-        self.poses = [SE2.from_array(pose) for pose in optimise(poses, edges).poses]
+        self.poses = [SE2.from_array(pose) for pose in optimise(poses, edges, rounds=rounds).poses]
