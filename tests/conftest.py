@@ -1,6 +1,11 @@
 """Shared by all tests."""
 
+import hypothesis
 import pytest
+
+# how long one example takes says nothing about the law it tests
+hypothesis.settings.register_profile("no deadline", deadline=None)
+hypothesis.settings.load_profile("no deadline")
 
 
 def pytest_addoption(parser):

@@ -48,7 +48,7 @@ def interrupted(folder, number, after_s, *arguments, **changes):
 def test_an_interrupted_run_leaves_nothing(number, code, tmp_path):
     command = ("sim", "campus", "-o", "campus.mcap", "--truth", "campus.tum")  # takes minutes
     ended, said = interrupted(tmp_path, number, 1.0, *command)
-    assert ended == code
+    assert ended == code, said
     assert said == "error: interrupted\n"
     assert names(tmp_path) == []
 
@@ -60,7 +60,7 @@ def test_ctrl_c_is_caught_from_the_start_and_in_the_compiler(after_s, tmp_path):
     folder.mkdir()
     command = ("slam", SAMPLES / "loop.csv.gz", "-q", "-o", "map.bsm")
     ended, said = interrupted(folder, signal.SIGINT, after_s, *command, NUMBA_CACHE_DIR=str(cache))
-    assert ended == 130
+    assert ended == 130, said
     assert said in ("", "error: interrupted\n")
     assert names(folder) == []
 
