@@ -4,7 +4,7 @@ import hypothesis
 import pytest
 
 # how long one example takes says nothing about the law it tests
-hypothesis.settings.register_profile("no deadline", deadline=None)
+hypothesis.settings.register_profile("no deadline", hypothesis.settings.default, deadline=None)
 hypothesis.settings.load_profile("no deadline")
 
 
