@@ -14,7 +14,7 @@ from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, evaluate
 SAMPLES_PER_STEP = 8  # of the search for candidates
 CHORDS_PER_STEP = 8  # a chord strays from its curve by about 2e-3 of the knot step
 CANDIDATES = 16
-NEWTON_STEPS = 6
+NEWTON_STEPS = 10
 PAIRS_AT_ONCE = 4_000_000
 
 
@@ -114,7 +114,7 @@ class MapQuery:
         slope = np.einsum("mi,mi->m", away, first)
         speed = np.einsum("mi,mi->m", first, first)
         bend = speed + np.einsum("mi,mi->m", away, second)
-        step = slope / np.where(bend > 0.5 * speed, bend, np.maximum(speed, 1e-12))
+        step = slope / np.where(bend > 0.02 * speed, bend, np.maximum(speed, 1e-12))
         bounded: Vector = np.clip(step, -0.5, 0.5)
         return bounded
 
