@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.trimming import remove_points
@@ -28,7 +28,10 @@ from bsmap_cli.settings import setting
 ABSENT = -1.0  # a span whose score ends here or below is not there
 DARK_MISS = 0.5  # nothing returned: a miss, or a surface that does not return every beam
 DARK_COSINE, DARK_RANGE = 0.5, 0.95  # where it counts at all against what was hardly ever hit
+
 Flags = NDArray[np.bool_]
+View = tuple[Sight, Vector]
+"""What a scan looked through, and the pose (3,) of its base in the map."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +40,8 @@ class VisibilitySettings:
 
     method: str = setting(
         "evidence",
-        "weigh all views when the map is finished; lower weights by each miss as scans come; "
-        "or keep all",
+        "weigh all views when the map is finished; lower weights by each miss as scans come "
+        "(a map that is built anew weighs all views then, too); keep all",
         choices=("evidence", "fade", "off"),
     )
     leaving: float = setting(
@@ -67,14 +70,13 @@ class Tally(NamedTuple):
 
 def remove_unseen(
     curve_map: CurveMap,
-    sights: Sequence[Sight],
-    poses: Points,
+    views: Sequence[View],
     *,
     sigma_m: float,
     settings: VisibilitySettings,
     min_length: float,
 ) -> None:
-    """Remove the parts of curves that the views at `poses` (n, 3), in order of time, contradict.
+    """Remove the parts of curves that the views, in order of time, contradict.
 
     A control point goes when all spans that it shapes are absent. `min_length` : what is left of
     a curve and shorter goes too [knot steps].
@@ -83,11 +85,11 @@ def remove_unseen(
     rows = int(arrays.sizes[1])
     tally = Tally(np.zeros(rows), np.zeros(rows), np.full(rows, math.inf), np.zeros(rows))
     looks = []
-    for sight, pose in zip(sights, poses, strict=True):
+    for sight, pose in views:
         look = look_at(curve_map, sight, pose, sigma_m)
         _count_hits(look, tally)
         looks.append(look)
-    for sight, look in zip(sights, looks, strict=True):
+    for (sight, _), look in zip(views, looks, strict=True):
         _weigh(look, sight.reach_m, tally, settings.leaving, settings.arriving, settings.tentative)
     gone = np.zeros(rows, bool)
     if _gone_points(arrays, curve_map.degree, tally.score <= ABSENT, gone):

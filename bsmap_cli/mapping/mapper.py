@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.evidence import View, remove_unseen
+from bsmap_cli.mapping.fading import fade
 from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapDocument
@@ -12,6 +16,9 @@ from bsmap_cli.mapping.scan_levels import scan_levels
 from bsmap_cli.sensor.gate import Returns, find_returns
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.sight import find_sight
+
+VIEW_STEPS, VIEW_TURN = 2.0, math.radians(7.0)  # from one kept view to the next [finest knot steps]
 
 
 class Mapper:
@@ -21,6 +28,8 @@ class Mapper:
         self.settings = settings
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self.noise = RangeNoise(settings.sensor, settings.ladder[-1])
+        self._views: list[View] = []
+        self._last_view: SE2 | None = None
 
     def insert(self, scan: Scan, pose_map_base: SE2) -> None:
         """Algorithm 1: one scan enters the map at its pose."""
@@ -28,6 +37,7 @@ class Mapper:
         self.noise.observe(scan)
         returns = find_returns(scan, self.settings.sensor, finest)
         self.insert_returns(returns, pose_map_base.as_array())
+        self._look(scan, pose_map_base)
 
     def insert_returns(self, returns: Returns, pose_map_base: Vector) -> None:
         """Insert what `find_returns` gave, into every level."""
@@ -38,8 +48,43 @@ class Mapper:
         for level, seen in zip(self.levels, clusters, strict=True):
             insert_clusters(level, seen, pose_map_base, settings)
 
+    def _look(self, scan: Scan, pose_map_base: SE2) -> None:
+        """Lower at once the weights of what the scan looks through, or keep it for the end."""
+        settings, finest = self.settings, self.settings.ladder[-1]
+        method = settings.visibility.method
+        if method == "fade":
+            sight = find_sight(scan, settings.sensor, finest)
+            for level in self.levels:
+                fade(
+                    level,
+                    sight,
+                    pose_map_base.as_array(),
+                    sigma_m=self.noise.sigma_m,
+                    min_length=settings.segmentation.min_length,
+                )
+        elif method == "evidence" and self._is_new_view(pose_map_base):
+            self._last_view = pose_map_base
+            sight = find_sight(scan, settings.sensor, finest)
+            self._views.append((sight, pose_map_base.as_array()))
+
+    def _is_new_view(self, pose_map_base: SE2) -> bool:
+        if self._last_view is None:
+            return True
+        moved = self._last_view.inverse() @ pose_map_base
+        way = math.hypot(moved.x, moved.y)
+        return way >= VIEW_STEPS * self.settings.ladder[-1] or abs(moved.theta) >= VIEW_TURN
+
     def document(self) -> MapDocument:
-        """The map as it stands."""
+        """The map as it stands, without what later views contradict."""
+        if self._views:
+            for level in self.levels:
+                remove_unseen(
+                    level,
+                    self._views,
+                    sigma_m=self.noise.sigma_m,
+                    settings=self.settings.visibility,
+                    min_length=self.settings.segmentation.min_length,
+                )
         cap = self.settings.merging.max_weight
         return MapDocument(
             degree=self.settings.degree,

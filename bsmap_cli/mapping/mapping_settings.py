@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from bsmap_cli.mapping.alignment import AlignmentSettings
 from bsmap_cli.mapping.association import AssociationSettings
+from bsmap_cli.mapping.evidence import VisibilitySettings
 from bsmap_cli.mapping.fitting import FittingSettings
 from bsmap_cli.mapping.merging import MergingSettings
 from bsmap_cli.mapping.segmentation import SegmentationSettings
@@ -24,3 +25,4 @@ class MappingSettings:
     fitting: FittingSettings = field(default_factory=FittingSettings)
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     merging: MergingSettings = field(default_factory=MergingSettings)
+    visibility: VisibilitySettings = field(default_factory=VisibilitySettings)

@@ -11,6 +11,7 @@ from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.scan_levels import coarser_levels
 from bsmap_cli.settings import setting
+from bsmap_cli.slam.contradicted import remove_contradicted
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.uncertainty import isotropic_information
@@ -96,6 +97,7 @@ def final_map(
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
     levels = build_map(poses, keyframes, written, settings, sigma_m)
+    remove_contradicted(levels, keyframes, poses, settings, sigma_m)
     for level in levels:
         if len(keyframes) >= FEW_KEYFRAMES:
             drop_unconfirmed(level, settings.final_map.min_views)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.settings import setting
 
 
@@ -56,7 +57,8 @@ class Keyframe:
     scan_index : its place in the trajectory. pose_local : (3,) where tracking saw the base, in
     the drifting local frame. submap : index of the submap it was matched against.
     information : (3, 3) of that match. coasted_m : what the way from the last keyframe may be off
-    because no wall told. weak : tracking had lost the map here.
+    because no wall told. weak : tracking had lost the map here. sight : what the scan looked
+    through, where that is asked for.
     """
 
     index: int
@@ -67,6 +69,7 @@ class Keyframe:
     information: Vector
     coasted_m: float
     weak: bool
+    sight: Sight | None = None
 
 
 def is_keyframe(step: SE2, settings: KeyframeSettings, finest_step_m: float) -> bool:

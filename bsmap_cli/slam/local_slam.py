@@ -10,6 +10,7 @@ import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
 from bsmap_cli.slam.prediction import Cadence, Predictor
@@ -140,6 +141,12 @@ class LocalSlam:
         if len(self.submaps[-1].keyframes) >= full // 2 and len(self.submaps) == self.finished + 1:
             self._begin_submap()
         return keyframe
+
+    def fade(self, keyframe: Keyframe, sight: Sight) -> None:
+        """Let the submaps that hold a keyframe lose what it looks through."""
+        for submap in self.submaps:
+            if submap.keyframes[-1:] == [keyframe.index]:
+                submap.fade(sight, submap.to_submap(keyframe.pose_local), self.sigma_m)
 
     def _begin_submap(self) -> None:
         self.submaps.append(Submap(len(self.submaps), self._pose, self.settings))

@@ -16,9 +16,11 @@ from bsmap_cli.mapping.scan_levels import scan_levels
 from bsmap_cli.sensor.gate import find_returns
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.sight import find_sight
 from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.final_map import final_map
 from bsmap_cli.slam.full_graph import solve_full_graph
+from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.slam_settings import SlamSettings
@@ -82,7 +84,8 @@ class Slam:
             self._closer = LoopCloser(self._local, SubmapGraph(self._local))
         self._local.sigma_m = sigma_m
         local = self._local
-        returns = find_returns(scan, settings.sensor, settings.ladder[-1], self._twist(scan))
+        twist = self._twist(scan)
+        returns = find_returns(scan, settings.sensor, settings.ladder[-1], twist)
         clusters = scan_levels(
             returns, settings.ladder, settings.segmentation, settings.fitting, local.sigma_m
         )
@@ -98,9 +101,23 @@ class Slam:
         self._degenerate += tracked.degenerate
         self._note_loss(tracked.lost, scan.stamp_ns)
         self._last_stamp_ns = scan.stamp_ns
+        if tracked.keyframe:
+            self._look(scan, tracked.keyframe, twist)
         if tracked.keyframe and settings.loops.enabled and self._closer:
             self._closer.process(tracked.keyframe)
             self.seconds["loops"] += time.perf_counter() - done
+
+    def _look(self, scan: Scan, keyframe: Keyframe, twist: np.ndarray | None) -> None:
+        """Let the map fade where the keyframe looks through it, or remember that for the end."""
+        settings, local = self.settings, self._local
+        method = settings.visibility.method
+        if method == "off" or local is None:
+            return
+        sight = find_sight(scan, settings.sensor, settings.ladder[-1], twist)
+        if method == "fade":
+            local.fade(keyframe, sight)
+        if method == "evidence" or settings.final_map.rebuild:
+            keyframe.sight = sight
 
     def _twist(self, scan: Scan) -> np.ndarray | None:
         """Velocity (vx, vy, omega) of the base, for logs that say when each beam was fired."""
@@ -133,7 +150,7 @@ class Slam:
             poses, maps = final_map(poses, local.keyframes, settings, local.sigma_m)
             levels = tuple(freeze_level(level, max_weight=cap) for level in maps)
         else:
-            levels = tracked_levels(local.submaps, local.keyframes, poses, max_weight=cap)
+            levels = tracked_levels(local.submaps, local.keyframes, poses, settings, local.sigma_m)
         self.seconds["graph"] += solved - started
         self.seconds["final_map"] += time.perf_counter() - solved
         document = MapDocument(degree=settings.degree, max_weight=cap, levels=levels)

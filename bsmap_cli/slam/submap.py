@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.fading import fade
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.likelihood import Likelihood, build_likelihood
 
@@ -52,6 +54,17 @@ class Submap:
         self.keyframes.append(keyframe)
         self.viewpoints.append((pose_submap_base.x, pose_submap_base.y))
         self.extent_m = max(self.extent_m, math.hypot(pose_submap_base.x, pose_submap_base.y))
+
+    def fade(self, sight: Sight, pose_submap_base: SE2, sigma_m: float) -> None:
+        """Let what a keyframe looks through lose weight."""
+        for level in self.levels:
+            fade(
+                level,
+                sight,
+                pose_submap_base.as_array(),
+                sigma_m=sigma_m,
+                min_length=self._settings.segmentation.min_length,
+            )
 
     def likelihood(self, *, cell_m: float, heights: int) -> Likelihood:
         """What searches look at, for the curves as they stand; kept until they change."""
