@@ -8,7 +8,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import match_points
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.mapping.merging import merge_runs
+from bsmap_cli.mapping.run_merging import merge_runs
 from bsmap_cli.mapping.runs import plan_runs
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.mapping.tracked_insertion import insert_tracked

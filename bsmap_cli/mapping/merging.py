@@ -13,20 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import USABLE_WEIGHT, refresh_spans
 from bsmap_cli.mapping.fitting import (
-    arc_length_parameters,
     fit_control_points,
     fit_rms,
     lattice_domain,
-    spacing_weights,
 )
 from bsmap_cli.mapping.level_arrays import LevelArrays
-from bsmap_cli.mapping.runs import BEGIN, CURVE, END, KNOWN_BEGIN, KNOWN_END
 from bsmap_cli.mapping.span_index import remove_span
 from bsmap_cli.mapping.table_merge import merge_by_table
 from bsmap_cli.settings import setting
@@ -246,128 +242,3 @@ def merge_run(
         by_table,
     )
     return True
-
-
-@njit(cache=True)
-def _advance(points: Points, tangents: Points, j: int) -> float:
-    """Way [m] from point j - 1 to j along the smoothed direction: noise does not lengthen it."""
-    dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
-    tx, ty = tangents[j, 0] + tangents[j - 1, 0], tangents[j, 1] + tangents[j - 1, 1]
-    return float((dx * tx + dy * ty) / (math.hypot(tx, ty) + 1e-300))
-
-
-@njit(cache=True)
-def _run_parameters(
-    run: NDArray[np.int64],
-    curves: NDArray[np.int64],
-    u: Vector,
-    points: Points,
-    tangents: Points,
-    matrix: Points,
-    knot_step_m: float,
-    first_penalty: float,
-    run_u: Vector,
-) -> None:
-    """Parameters of a run: foot points where it is matched, arc length where it is not."""
-    begin, end = run[BEGIN], run[END]
-    known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
-    n = end - begin
-    part = points[begin:end]
-    anchor = known_begin - begin
-    run_u[anchor] = u[known_begin] if known_end > known_begin else 0.0
-    for j in range(known_begin + 1, end):
-        if j < known_end and curves[j] == run[CURVE]:
-            run_u[j - begin] = u[j]
-        else:  # beyond the curve, or a miss that the run bridges
-            run_u[j - begin] = run_u[j - 1 - begin] + _advance(points, tangents, j) / knot_step_m
-    for j in range(known_begin - 1, begin - 1, -1):
-        run_u[j - begin] = run_u[j + 1 - begin] - _advance(points, tangents, j + 1) / knot_step_m
-    if known_end - known_begin == n or n < 2:
-        return
-    low, high = lattice_domain(np.min(run_u), np.max(run_u))
-    count = high - low + matrix.shape[0] - 1
-    weights, first_fit = np.empty(n), np.empty((count, 2))
-    spacing_weights(run_u, 1.0, weights)
-    none = np.zeros((count, 2))
-    if not fit_control_points(
-        run_u, part, weights, matrix, low, first_penalty, none, np.zeros(count), first_fit
-    ):
-        return
-    arc_u = run_u.copy()
-    arc_length_parameters(arc_u, first_fit, matrix, low, anchor, knot_step_m)
-    for j in range(anchor):
-        run_u[j] = arc_u[j]
-    if known_end > begin:
-        last = known_end - 1 - begin
-        behind = run_u[last] - arc_u[last] if known_end > known_begin else 0.0
-        for j in range(last + 1, n):
-            run_u[j] = arc_u[j] + behind
-    else:
-        run_u[:] = arc_u
-
-
-@njit(cache=True)
-def merge_runs(
-    level: LevelArrays,
-    matrix: Points,
-    knot_step_m: float,
-    runs: NDArray[np.int64],
-    resume: int,
-    curves: NDArray[np.int64],
-    u: Vector,
-    points: Points,
-    tangents: Points,
-    max_weight: float,
-    penalty: float,
-    first_penalty: float,
-    roughest_m: float,
-    by_table: bool,
-) -> int:
-    """Merge the runs from `resume` on; the first one that finds no room, or their number."""
-    for r in range(resume, len(runs)):
-        begin, end = runs[r, BEGIN], runs[r, END]
-        curve = runs[r, CURVE]
-        run_u, weights = np.empty(end - begin), np.empty(end - begin)
-        _run_parameters(
-            runs[r], curves, u, points, tangents, matrix, knot_step_m, first_penalty, run_u
-        )
-        rows = math.ceil(np.max(run_u) - np.min(run_u)) + 2 * matrix.shape[0]
-        if curve >= 0:
-            rows += level.count[curve]
-        if not has_room(level, 2 * rows + 16):
-            level.sizes[3] = 2 * rows + 16
-            return r
-        spacing_weights(run_u, 1.0, weights)
-        for j in range(runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]):
-            if curves[j] != curve:
-                weights[j - begin] = 0.0
-        merged = merge_run(
-            level,
-            matrix,
-            knot_step_m,
-            curve,
-            run_u,
-            points[begin:end],
-            weights,
-            max_weight,
-            penalty,
-            roughest_m,
-            by_table,
-        )
-        known_begin, known_end = runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]
-        if not merged and known_begin < known_end and known_end - known_begin < end - begin:
-            known = slice(known_begin - begin, known_end - begin)
-            merge_run(
-                level,
-                matrix,
-                knot_step_m,
-                curve,
-                run_u[known],
-                points[known_begin:known_end],
-                weights[known],
-                max_weight,
-                penalty,
-                roughest_m,
-                by_table,
-            )
-    return len(runs)

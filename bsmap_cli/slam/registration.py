@@ -18,7 +18,6 @@ from bsmap_cli.geometry.kernels import (
     foot_point,
     polynomial_jet,
     solve3,
-    symmetric_eigen3,
 )
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import END_TOLERANCE, MIN_COSINE, usable_rows
@@ -27,6 +26,7 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
+from bsmap_cli.slam.degeneracy import keep_unobserved
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 TANGENT_NOISE = (
@@ -175,42 +175,6 @@ def _accumulate(  # noqa: PLR0915
     gradient[0], gradient[1], gradient[2] = g0, g1, g2
     tally[0], tally[1], tally[2], tally[3] = inliers, squares, lever, total
     tally[4] = feigned / (knot_step_m * knot_step_m)
-
-
-@njit(cache=True)
-def keep_unobserved(
-    hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
-) -> int:
-    """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
-
-    `wanted` leads back to where this level began: the prediction, or what a coarser level saw.
-
-    Directions are judged with angles scaled by the lever arm, so that metres compare with metres,
-    and without the prior, which must not make a corridor look observed. What the noise feigned
-    there is taken out of `hessian`.
-    """
-    scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
-    lever = max(lever_m, 1e-9)
-    for i in range(3):
-        scaled[i, 2] /= lever
-        scaled[2, i] /= lever
-    symmetric_eigen3(scaled, values, vectors)
-    found = 0
-    for k in range(3):
-        if values[k] > least:
-            continue
-        found += 1
-        missing = 0.0
-        for i in range(3):
-            scale = lever if i == 2 else 1.0
-            missing += vectors[i, k] * scale * (wanted[i] - delta[i])
-        for i in range(3):
-            scale = lever if i == 2 else 1.0
-            delta[i] += missing * vectors[i, k] / scale
-            for m in range(3):
-                other = lever if m == 2 else 1.0
-                hessian[i, m] -= values[k] * vectors[i, k] * vectors[m, k] * scale * other
-    return found
 
 
 @njit(cache=True)

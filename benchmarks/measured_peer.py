@@ -1,0 +1,96 @@
+"""Odometry of another program on planar scans, measured in a process of its own.
+
+python benchmarks/measured_peer.py PEER SCANS.npz POSES.npy
+
+Needs numpy and the peer alone, so that it runs in an environment of its own. SCANS.npz holds
+points (n, 3) float64 of all returns in the base frame, z = 0, starts (scans + 1,), and guesses
+(scans, 4, 4): the step that odometry saw, or nothing. Only the calls of the peer are timed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import resource
+import sys
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+VOXEL_M = 0.2
+Step = Callable[[Any, Any], Any]  # points (n, 3) and the guessed step (4, 4) or None: the pose
+
+
+def kiss_icp(reach_m: float) -> Step:
+    """KISS-ICP on one thread; a guess takes the place of its constant velocity."""
+    from kiss_icp.config import KISSConfig
+    from kiss_icp.kiss_icp import KissICP
+
+    config = KISSConfig()
+    config.data.max_range, config.data.min_range, config.data.deskew = reach_m, 0.0, False
+    config.mapping.voxel_size = VOXEL_M
+    config.registration.max_num_threads = 1
+    odometry = KissICP(config)
+    none = np.zeros(0)
+
+    def step(points: Any, guess: Any) -> Any:
+        if guess is not None:
+            odometry.last_delta = guess
+        odometry.register_frame(points, none)
+        return odometry.last_pose
+
+    return step
+
+
+def small_gicp(reach_m: float) -> Step:
+    """VGICP of each scan against a voxel map that grows, as in its example, on one thread."""
+    import small_gicp as gicp
+
+    voxels = gicp.GaussianVoxelMap(2.0 * VOXEL_M)
+    voxels.set_lru(horizon=10**6, clear_cycle=10**6)
+    state = [np.eye(4), np.eye(4), True]
+
+    def step(points: Any, guess: Any) -> Any:
+        cloud, _ = gicp.preprocess_points(points, downsampling_resolution=0.5 * VOXEL_M)
+        if not state[2]:
+            predicted = state[0] @ (state[1] if guess is None else guess)
+            found = gicp.align(voxels, cloud, init_T_target_source=predicted)
+            pose = found.T_target_source
+            state[1] = np.linalg.inv(state[0]) @ pose
+            state[0] = pose
+        voxels.insert(cloud, state[0])
+        state[2] = False
+        return state[0]
+
+    return step
+
+
+PEERS = {"kiss-icp": kiss_icp, "small_gicp": small_gicp}
+
+
+def main() -> None:
+    """Run one peer; write (scans, 3) poses, print seconds and memory."""
+    peer, scans, poses = sys.argv[1:]
+    with np.load(scans) as held:
+        points, starts, guesses = held["points"], held["starts"], held["guesses"]
+    reach_m = float(np.abs(points).max()) * 1.5
+    clouds = [points[a:b] for a, b in itertools.pairwise(starts)]
+    for warm in (True, False):
+        step = PEERS[peer](reach_m)
+        found = np.empty((len(clouds), 3))
+        used = clouds[:50] if warm else clouds
+        began = perf_counter()
+        for k, cloud in enumerate(used):
+            pose = step(cloud, guesses[k] if len(guesses) else None)
+            found[k] = pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])
+        seconds = perf_counter() - began
+    np.save(poses, found)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024
+    print(json.dumps({"seconds": seconds, "peak_memory_mb": round(peak / unit, 1)}))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Directions in which no wall says where the robot is: keep the prediction there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from bsmap_cli.geometry.kernels import symmetric_eigen3
+from bsmap_cli.geometry.se2 import Points, Vector
+
+
+@njit(cache=True)
+def keep_unobserved(
+    hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
+) -> int:
+    """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
+
+    `wanted` leads back to where this level began: the prediction, or what a coarser level saw.
+
+    Directions are judged with angles scaled by the lever arm, so that metres compare with metres,
+    and without the prior, which must not make a corridor look observed. What the noise feigned
+    there is taken out of `hessian`.
+    """
+    scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
+    lever = max(lever_m, 1e-9)
+    for i in range(3):
+        scaled[i, 2] /= lever
+        scaled[2, i] /= lever
+    symmetric_eigen3(scaled, values, vectors)
+    found = 0
+    for k in range(3):
+        if values[k] > least:
+            continue
+        found += 1
+        missing = 0.0
+        for i in range(3):
+            scale = lever if i == 2 else 1.0
+            missing += vectors[i, k] * scale * (wanted[i] - delta[i])
+        for i in range(3):
+            scale = lever if i == 2 else 1.0
+            delta[i] += missing * vectors[i, k] / scale
+            for m in range(3):
+                other = lever if m == 2 else 1.0
+                hessian[i, m] -= values[k] * vectors[i, k] * vectors[m, k] * scale * other
+    return found
