@@ -12,11 +12,12 @@ from cases import Case
 from bsmap_cli.config import Settings
 from bsmap_cli.evaluation.map_quality import map_quality
 from bsmap_cli.evaluation.redundancy import redundancy
-from bsmap_cli.evaluation.relations import relation_errors
+from bsmap_cli.evaluation.relations import Relations, relation_errors
 from bsmap_cli.evaluation.trajectory_error import absolute_error, match_poses
 from bsmap_cli.evaluation.true_surfaces import cut_surfaces
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.pipeline import Run, run_slam
+from bsmap_cli.sensor.trajectory import Trajectory
 
 
 @dataclass(slots=True, kw_only=True)
@@ -122,3 +123,12 @@ def _draw(run: Run, case: Case, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / f"{case.name.replace('/', '-')}.png").open("wb") as stream:
         save_figure(figure, stream, "png")
+
+
+def trajectory_figure(trajectory: Trajectory, reference: Trajectory | Relations | None) -> float:
+    """ATE rmse against a truth, or mean error of the relations [m]; nan without either."""
+    if isinstance(reference, Relations):
+        return float(relation_errors(trajectory, reference).translation_m.mean())
+    if reference is None:
+        return float("nan")
+    return absolute_error(match_poses(trajectory, reference)).as_json()["rmse_m"]

@@ -9,11 +9,11 @@ points (n, 3) float64 of all returns in the base frame, z = 0, starts (scans + 1
 
 from __future__ import annotations
 
-import itertools
 import json
 import resource
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
@@ -76,7 +76,7 @@ def main() -> None:
     with np.load(scans) as held:
         points, starts, guesses = held["points"], held["starts"], held["guesses"]
     reach_m = float(np.abs(points).max()) * 1.5
-    clouds = [points[a:b] for a, b in itertools.pairwise(starts)]
+    clouds = [points[a:b] for a, b in pairwise(starts)]
     for warm in (True, False):
         step = PEERS[peer](reach_m)
         found = np.empty((len(clouds), 3))
