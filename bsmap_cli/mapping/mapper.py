@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from bsmap_cli.geometry.se2 import SE2, Vector
+from bsmap_cli.mapping.cleanup import tidy
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.evidence import View, remove_unseen
 from bsmap_cli.mapping.fading import fade
@@ -75,7 +76,7 @@ class Mapper:
         return way >= VIEW_STEPS * self.settings.ladder[-1] or abs(moved.theta) >= VIEW_TURN
 
     def document(self) -> MapDocument:
-        """The map as it stands, without what later views contradict."""
+        """The map as it stands, tidied, without what later views contradict."""
         if self._views:
             for level in self.levels:
                 remove_unseen(
@@ -83,6 +84,13 @@ class Mapper:
                     self._views,
                     sigma_m=self.noise.sigma_m,
                     settings=self.settings.visibility,
+                    min_length=self.settings.segmentation.min_length,
+                )
+        if self.settings.association.method == "curve":
+            for level in self.levels:
+                tidy(
+                    level,
+                    max_weight=float(self.settings.merging.max_weight),
                     min_length=self.settings.segmentation.min_length,
                 )
         cap = self.settings.merging.max_weight
