@@ -46,7 +46,7 @@ def fit_raw(u, points, penalty, degree=3, weights=None):
 
 
 # the ridge that keeps unobserved control points defined leaves its trace, more so at high degree
-@pytest.mark.parametrize(("degree", "trace_m"), [(2, 1e-6), (3, 2e-6), (4, 2e-5), (5, 2e-3)])
+@pytest.mark.parametrize(("degree", "trace_m"), [(2, 1e-6), (3, 2e-6), (4, 1e-4), (5, 2e-3)])
 @given(seed=seeds, spans=st.integers(1, 12), first=st.integers(-40, 40))
 @settings(max_examples=15, deadline=None)
 def test_oracle_04_fit_equals_scipy_lsq(degree, trace_m, seed, spans, first):
