@@ -11,11 +11,12 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
+from paper_basins import Basin, basins
 from paper_figures import draw_errors, draw_missions, draw_shapes
 from paper_missions import LADDERS, MISSIONS, MissionRun, compile_kernels, mission_runs
 from paper_studies import ParameterRun, ShapesRun, parameter_runs, shapes_runs
 
-PARTS = ("missions", "parameters", "shapes")
+PARTS = ("missions", "parameters", "shapes", "basins")
 QUICK_SHARE = 0.34
 
 
@@ -40,6 +41,8 @@ def main() -> None:
     if "shapes" in asked.parts:
         shown = print_shapes(shapes_runs(share))
         draw_shapes(shown[-1], asked.out)
+    if "basins" in asked.parts and not asked.quick:
+        print_basins(basins())
 
 
 def print_missions(runs: Iterable[MissionRun]) -> list[MissionRun]:
@@ -73,11 +76,10 @@ def print_missions(runs: Iterable[MissionRun]) -> list[MissionRun]:
 def print_parameters(runs: Iterable[ParameterRun]) -> None:
     """One row a value."""
     _head(
-        "profile", "parameter", "value", "curves", "control points", "bytes", "rms", "p95",
-        "redundancy", "of what stands", "of the new box", "ghosts",
+        "profile", "parameter", "value", "curves", "control points", "bytes", "drawn",
+        "ghosts", "rms", "p95", "of what stands", "of the new box",
     )  # fmt: skip
     for run in runs:
-        quality = run.quality
         _row(
             run.profile,
             run.parameter,
@@ -85,12 +87,12 @@ def print_parameters(runs: Iterable[ParameterRun]) -> None:
             run.curves,
             run.control_points,
             run.bytes,
-            _length(quality.rms_m),
-            _length(quality.p95_m),
-            f"{quality.redundancy:.2f}",
-            f"{100 * (quality.coverage or 0.0):.0f} %",
-            f"{100 * run.new_share:.0f} %",
+            f"{run.drawn_m:.1f} m",
             f"{run.ghost_m:.2f} m",
+            _length(run.rms_m),
+            _length(run.p95_m),
+            f"{100 * run.standing_share:.0f} %",
+            f"{100 * run.new_share:.0f} %",
         )
 
 
@@ -121,6 +123,20 @@ def print_shapes(runs: Iterable[ShapesRun]) -> list[ShapesRun]:
         )
         done.append(run)
     return done
+
+
+def print_basins(found: Iterable[Basin]) -> None:
+    """One row a place, distance and method."""
+    _head("scene", "lidar", "off by", "method", "found", "time")
+    for basin in found:
+        _row(
+            basin.scene,
+            basin.lidar,
+            f"{basin.off_m:g} m, {basin.off_deg:g}°",
+            basin.method,
+            f"{100 * basin.found:.0f} %",
+            f"{basin.ms:.1f} ms",
+        )
 
 
 def _length(metres: float) -> str:

@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from cases import SimulatedLog
 from paper_missions import beginning_of, update_seconds
+from scipy.spatial import KDTree
 
 from bsmap_cli.config import Settings, load_settings
-from bsmap_cli.evaluation.map_quality import MapQuality, map_quality
+from bsmap_cli.evaluation.map_quality import COVER_M
 from bsmap_cli.evaluation.map_statistics import MapStatistics, map_statistics, sizes_of
+from bsmap_cli.evaluation.trajectory_error import rms
 from bsmap_cli.evaluation.true_surfaces import TrueSurfaces, cut_surfaces
-from bsmap_cli.geometry.se2 import SE2
-from bsmap_cli.mapping.map_document import MapDocument, MapLevel
+from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.sampling import sample_level
 from bsmap_cli.pipeline import run_map, run_slam
 from bsmap_cli.sensor.simulator.simulation import Simulation, simulate
@@ -22,7 +24,7 @@ from bsmap_cli.sensor.trajectory import Trajectory
 
 RATE_HZ = 20.0
 GHOST_M = 0.05  # a curve farther from all that stands is of something that has gone, or never was
-STEP_M = 0.02
+STEP_M = 0.01
 VARIED = {
     "Delta": ("ladder", ("[0.4]", "[0.2]", "[0.1]")),
     "gamma_track": ("association.track_dist", ("0.25", "0.5", "1", "2", "4")),
@@ -35,8 +37,9 @@ STUDIED = {"paper": 0.0, "default": 0.01}  # range noise [m] with which each pro
 class ParameterRun:
     """One value of one parameter, the others as the profile has them, Delta 0.2 m.
 
-    quality : against what stands at the end; new_share : of the box that came half-way, the part
-    within 3 cm of a curve; ghost_m : length of curves farther than 5 cm from all that stands.
+    rms_m, p95_m : from the curves to what stands at the end. standing_share, new_share : of what
+    stands, and of the box that came half-way, the part within 3 cm of a curve. drawn_m : length of
+    the curves; ghost_m : of those farther than 5 cm from all that stands.
     """
 
     profile: str
@@ -45,8 +48,11 @@ class ParameterRun:
     curves: int
     control_points: int
     bytes: int
-    quality: MapQuality
+    rms_m: float
+    p95_m: float
+    standing_share: float
     new_share: float
+    drawn_m: float
     ghost_m: float
 
 
@@ -85,9 +91,10 @@ def _parameter_run(
     surfaces = simulation.world.surfaces()
     standing = cut_surfaces([s.points for s in surfaces if np.isinf(s.to_s)])
     new = cut_surfaces([s.points for s in surfaces if np.isfinite(s.from_s)])
-    quality = map_quality(level, standing, pose_world_map=start)
-    grown = map_quality(level, new, pose_world_map=start)
-    assert quality is not None and grown is not None
+    samples = sample_level(level, STEP_M)
+    points = start.transform(samples.points)
+    distances = standing.distances(points)
+    chords = np.hypot(*np.diff(points, axis=0).T) * (np.diff(samples.piece) == 0)
     return ParameterRun(
         profile=profile,
         parameter=parameter,
@@ -95,10 +102,18 @@ def _parameter_run(
         curves=len(level),
         control_points=len(level.weights),
         bytes=sizes_of(document).level_bytes[-1],
-        quality=quality,
-        new_share=grown.coverage or 0.0,
-        ghost_m=_ghost_length(level, standing, start),
+        rms_m=rms(distances),
+        p95_m=float(np.percentile(distances, 95)),
+        standing_share=_covered(standing, points),
+        new_share=_covered(new, points),
+        drawn_m=float(chords.sum()),
+        ghost_m=float(chords[distances[1:] > GHOST_M].sum()),
     )
+
+
+def _covered(surfaces: TrueSurfaces, points: Points) -> float:
+    distance, _ = KDTree(points).query(surfaces.middles)
+    return float(np.mean(distance <= COVER_M))
 
 
 def _map(simulation: Simulation, settings: Settings) -> MapDocument:
@@ -107,13 +122,6 @@ def _map(simulation: Simulation, settings: Settings) -> MapDocument:
     start = SE2.from_array(simulation.truth.poses[0]).inverse()
     poses = np.array([(start @ SE2.from_array(p)).as_array() for p in simulation.truth.poses])
     return run_map(reader, Trajectory(simulation.truth.stamps_ns, poses), settings).document
-
-
-def _ghost_length(level: MapLevel, standing: TrueSurfaces, pose_world_map: SE2) -> float:
-    samples = sample_level(level, STEP_M)
-    points = pose_world_map.transform(samples.points)
-    chords = np.hypot(*np.diff(points, axis=0).T) * (np.diff(samples.piece) == 0)
-    return float(chords[standing.distances(points)[1:] > GHOST_M].sum())
 
 
 def shapes_runs(share: float) -> Iterator[ShapesRun]:
