@@ -30,8 +30,8 @@ class MissionRun:
     """One run, in the frame of its first pose.
 
     seconds, metres, degrees : (n,) time, and the error of each scan's pose. truth : (n, 3) true
-    poses. path_m : true way. update_ms : processor time a scan, for the map update alone (Algorithm 1 with the
-    true poses); slam_ms : for everything.
+    poses. path_m : true way. update_ms : processor time a scan, for the map update alone
+    (Algorithm 1 with the true poses); slam_ms : for everything.
     """
 
     mission: str
