@@ -100,7 +100,8 @@ def outside_gap(truth: Trajectory) -> np.ndarray:
     end = np.minimum(np.searchsorted(times, times[begin] + GAP_S), len(times) - 1)
     turned = np.abs(heading[end] - heading[begin])
     first = begin[np.argmin(np.abs(turned - GAP_RAD))]
-    return ~((times > times[first]) & (times < times[first] + GAP_S))
+    kept: np.ndarray = ~((times > times[first]) & (times < times[first] + GAP_S))
+    return kept
 
 
 def simulated_cases(

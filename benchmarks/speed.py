@@ -47,7 +47,7 @@ CONFIGURATIONS: dict[str, tuple[str, ...]] = {
     "1 level, no loops": ("ladder=[0.1]", "loops.enabled=false"),
 }
 STAGES = ("read", "fit", "register", "merge", "loops", "graph", "final_map", "write")
-PEERS = ("kiss-icp", "small_gicp")
+PEERS = ("kiss-icp", "small_gicp", "small_gicp, 3 layers")
 ENVIRONMENT = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -143,7 +143,10 @@ def measure_log(
         try:
             figures = medians(command, runs)
         except (OSError, subprocess.CalledProcessError):
-            print(f"  {peer} does not run with {peers_python}: pip install {peer}", file=sys.stderr)
+            print(
+                f"  {peer} does not run with {peers_python}: pip install kiss-icp small_gicp",
+                file=sys.stderr,
+            )
             continue
         figures["tracking_scans_per_second"] = len(stamps) / figures["seconds"]
         error = trajectory_figure(Trajectory(stamps, np.load(found)), reference)
