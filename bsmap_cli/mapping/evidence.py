@@ -25,7 +25,8 @@ from bsmap_cli.mapping.visibility import DARK, HIT, MISS, Look, look_at
 from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.settings import setting
 
-ABSENT = -1.0  # a span whose score ends here or below is not there
+ABSENT = -1.0  # where the score of a span and its neighbours ends here or below, it is not there
+NEIGHBOURS = 2  # spans to either side that are judged together
 DARK_MISS = 0.5  # nothing returned: a miss, or a surface that does not return every beam
 DARK_COSINE, DARK_RANGE = 0.5, 0.95  # where it counts at all against what was hardly ever hit
 
@@ -91,8 +92,9 @@ def remove_unseen(
         looks.append(look)
     for (sight, _), look in zip(views, looks, strict=True):
         _weigh(look, sight.reach_m, tally, settings.leaving, settings.arriving, settings.tentative)
-    gone = np.zeros(rows, bool)
-    if _gone_points(arrays, curve_map.degree, tally.score <= ABSENT, gone):
+    absent, gone = np.zeros(rows, bool), np.zeros(rows, bool)
+    _find_absent(arrays, curve_map.degree, tally.score, settings.leaving, absent)
+    if _gone_points(arrays, curve_map.degree, absent, gone):
         remove_points(curve_map, gone, min_length=min_length)
 
 
@@ -125,6 +127,26 @@ def _weigh(
         if counts:
             miss = DARK_MISS if verdict == DARK else 1.0
             tally.score[row] = max(-arriving, tally.score[row] - miss)
+
+
+@njit(cache=True)
+def _find_absent(
+    level: LevelArrays, degree: int, score: Vector, leaving: float, absent: Flags
+) -> None:
+    """Mark the spans that are surely not there, or not by the scores round them.
+
+    What is seen from few places alone goes with what it is a part of, and a wall stays up to
+    where a door that has opened began: none counts more than surely there or surely not.
+    """
+    for curve in range(level.sizes[0]):
+        first = level.offset[curve]
+        end = first + level.count[curve] - degree
+        for row in range(first, end):
+            total = 0.0
+            for other in range(max(first, row - NEIGHBOURS), min(end, row + NEIGHBOURS + 1)):
+                total += max(-leaving, score[other])
+            judged = score[row] <= -leaving or total <= ABSENT
+            absent[row] = judged and level.span_cell[row] >= 0
 
 
 @njit(cache=True)

@@ -23,7 +23,7 @@ from bsmap_cli.sensor.sight import Sight
 UNSEEN, HIT, MISS, DARK = 0, 1, 2, 3  # DARK: no beam came back from there, nor from behind
 
 LEAST_COSINE = 0.35  # of the incidence under which a span is judged: 70 degrees from its normal
-ON_SPAN = 0.5  # a beam that ends this near the span hits it [knot steps]
+ON_SPAN = 0.3  # a beam that ends this near the span hits it [knot steps]
 BEHIND = 1.0  # a beam that ends this far behind has passed it [knot steps]
 BESIDE = 1.0  # no beam this far beside a missed span may end near it [knot steps]
 HEADING = 0.01  # error of the heading that explains what is seen [rad]
