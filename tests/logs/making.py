@@ -26,7 +26,6 @@ from bsmap_cli.logs.reader import ReadOptions
 from bsmap_cli.sensor.scan import Scan
 
 SECOND_NS = 1_000_000_000
-AT_THE_BASE = SE2.identity()
 TIME, HEADER = "builtin_interfaces/msg/Time", "std_msgs/msg/Header"
 SCAN, ODOM, TF = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 
@@ -78,6 +77,7 @@ def assert_same(found: list[Scan], expected: list[Scan], *, odometry: bool = Tru
         assert a.angle_min_rad == b.angle_min_rad
         assert a.angle_increment_rad == b.angle_increment_rad
         assert a.time_increment_s == b.time_increment_s
+        assert (a.range_min_m, a.range_max_m) == (b.range_min_m, b.range_max_m)
         if odometry and b.pose_odom_base is not None:
             pose = b.pose_odom_base
             assert a.pose_odom_base == SE2(pose.x, pose.y, canonical_yaw(pose.theta))
@@ -183,7 +183,7 @@ def planar(stamp_ns, parent, child, pose: SE2):
 def messages_of(scans, ros: Ros):
     """(topic, type, log time, message): a level mounting, odometry, then the scan."""
     first = scans[0].stamp_ns
-    static = ros.transforms(planar(first, "base_link", "laser", SE2.identity()))
+    static = ros.transforms(planar(first, "base_link", "laser", scans[0].pose_base_laser))
     yield "/tf_static", TF, first, static
     for scan in scans:
         if scan.pose_odom_base is not None:
@@ -300,7 +300,7 @@ def foxglove_mcap(scans, encoding: str, **writer) -> bytes:
     }
     make = _JSON if encoding == "json" else _PROTOBUF
     first = scans[0].stamp_ns
-    transform = make["tf"](first, "base_link", "laser", SE2.identity())
+    transform = make["tf"](first, "base_link", "laser", scans[0].pose_base_laser)
     mcap.add_message(channels["/tf"], first, transform, first)
     for scan in scans:
         stamp = scan.stamp_ns
@@ -427,17 +427,17 @@ def numbers(values) -> str:
     return " ".join(f"{value:.9g}" for value in values)
 
 
-def flaser(scan: Scan, laser: SE2 = AT_THE_BASE) -> str:
+def flaser(scan: Scan, laser: SE2 | None = None) -> str:
     pose = scan.pose_odom_base or SE2.identity()
-    first = pose @ laser
+    first = pose @ (laser or scan.pose_base_laser)
     poses = f"{first.x!r} {first.y!r} {first.theta!r} {pose.x!r} {pose.y!r} {pose.theta!r}"
     ranges = scan.ranges_m.tolist()
     return f"FLASER {len(ranges)} {numbers(ranges)} {poses} {seconds(scan.stamp_ns)} host 0.5\n"
 
 
-def robotlaser(scan: Scan, laser: SE2 = AT_THE_BASE, remissions=(), farthest=0.0) -> str:
+def robotlaser(scan: Scan, laser: SE2 | None = None, remissions=(), farthest=0.0) -> str:
     pose = scan.pose_odom_base or SE2.identity()
-    first = pose @ laser
+    first = pose @ (laser or scan.pose_base_laser)
     poses = f"{first.x!r} {first.y!r} {first.theta!r} {pose.x!r} {pose.y!r} {pose.theta!r}"
     ranges = scan.ranges_m.tolist()
     return (
@@ -456,10 +456,12 @@ def carmen(scans, line=flaser) -> bytes:
 
 def csv(scans, *, seconds_column=False) -> bytes:
     beams = len(scans[0].ranges_m)
+    is_placed = any(scan.pose_base_laser != SE2.identity() for scan in scans)
     rows = [
         "# made by hand\n"
         + ("t" if seconds_column else "stamp_ns")
         + ",y,x,theta,angle_increment,angle_min,"
+        + ("laser_theta,laser_x,laser_y," if is_placed else "")
         + ",".join(f"r{i}" for i in range(beams))
     ]
     for scan in scans:
@@ -467,8 +469,10 @@ def csv(scans, *, seconds_column=False) -> bytes:
         stamp = seconds(scan.stamp_ns) if seconds_column else str(scan.stamp_ns)
         place = [""] * 3 if pose is None else [repr(pose.y), repr(pose.x), repr(pose.theta)]
         angles = [repr(scan.angle_increment_rad), repr(scan.angle_min_rad)]
+        laser = scan.pose_base_laser
+        mounting = [repr(laser.theta), repr(laser.x), repr(laser.y)] if is_placed else []
         ranges = ["" if math.isnan(v) else f"{v:.9g}" for v in scan.ranges_m.tolist()]
-        rows.append(",".join([stamp, *place, *angles, *ranges]))
+        rows.append(",".join([stamp, *place, *angles, *mounting, *ranges]))
     return ("\n".join(rows) + "\n").encode()
 
 
