@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
@@ -94,7 +93,7 @@ def test_other_numbers_of_beams_are_told(tmp_path):
 def test_robotlaser_states_its_angles_and_its_limit(tmp_path):
     lines = carmen(SCANS, lambda scan: robotlaser(scan, remissions=(1, 2, 3), farthest=81.9))
     found, _ = read(written(tmp_path, lines))
-    assert_same(found, [replace(scan, range_max_m=float32(81.9)) for scan in SCANS])
+    assert_same(found, [dataclasses.replace(scan, range_max_m=float32(81.9)) for scan in SCANS])
 
 
 @pytest.mark.parametrize("line", [flaser, robotlaser])
