@@ -107,6 +107,9 @@ class Ros:
         return find
 
     def bytes_of(self, message, type_name) -> bytes:
+        """The message as it travels; bytes are passed on, as a broken driver would."""
+        if isinstance(message, bytes):
+            return message
         if self.is_ros1:
             return bytes(ROS1.serialize_ros1(message, type_name))
         return bytes(ROS2.serialize_cdr(message, type_name, little_endian=self.little_endian))
@@ -245,7 +248,7 @@ def ros_mcap(messages, ros: Ros, *, encoding="ros2msg", schemas=None, **writer) 
                 "ros1" if ros.is_ros1 else "cdr",
                 mcap.register_schema(name, schema_encoding, schema),
             )
-        data = message if isinstance(message, bytes) else ros.bytes_of(message, type_name)
+        data = ros.bytes_of(message, type_name)
         mcap.add_message(channels[topic], log_time_ns, data, log_time_ns)
     mcap.finish()
     return stream.getvalue()

@@ -2,6 +2,8 @@
 
 import struct
 import tracemalloc
+from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 import pytest
@@ -23,7 +25,9 @@ SCANS = some_scans(80, 61)
 KINDS = [kind for kind in MAKERS if not kind.startswith("ros2")]
 TEXT = ("carmen flaser", "csv", "csv seconds", "carmen robotlaser")
 EXACT = ("mcap no chunks", "mcap plain chunks", "bag", *TEXT)
-CHECKED = [k for k in KINDS if k.endswith(("gz", "zst")) or k in ("mcap zstd", "mcap lz4")]
+CHUNKED = [kind for kind in KINDS if kind.startswith("mcap ") and kind != "mcap no chunks"]
+CHECKED = [*CHUNKED, "mcap no chunks", *(kind for kind in KINDS if kind.endswith(("gz", "zst")))]
+A_CHUNK = 40  # scans
 
 
 def try_to_read(path):
@@ -96,16 +100,22 @@ def test_a_flipped_byte_anywhere(kind, whole, tmp_path):
     path = tmp_path / "log"
     for twentieth in range(20):
         at = len(data) * (2 * twentieth + 1) // 40
+        path.write_bytes(data[:at])
+        before, _ = try_to_read(path)
         flipped = bytearray(data)
         flipped[at] ^= 0x55
         path.write_bytes(flipped)
         found, report = try_to_read(path)
-        good = sum(any(is_same(a, b) for b in SCANS) for a in found)
-        if kind in CHECKED and report is not None and good < len(found):
-            assert report.truncated, "the checksum must tell"
-        if kind in ("mcap zstd", "mcap lz4"):
+        leading = sum(takewhile(bool, (is_same(a, b) for a, b in zip(found, SCANS, strict=False))))
+        if kind in EXACT and kind not in CHUNKED:
+            assert leading >= len(before) - 1, "every scan before the fault is used"
+        elif not kind.endswith("zst"):  # of a block or a page, what is behind its checksum
+            assert leading >= len(before) - A_CHUNK
+        if kind in CHECKED and leading < len(SCANS):
+            assert report is None or report.truncated, "the checksum must tell"
+        if kind in CHUNKED:
+            good = sum(any(is_same(a, b) for b in SCANS) for a in found)
             assert good == len(found), "a damaged chunk must not be used"
-            assert report is None or report.truncated or good == len(SCANS)
 
 
 @pytest.mark.parametrize("kind", ["mcap zstd", "bag lz4", "lone db3", "csv", "carmen flaser"])
@@ -177,15 +187,49 @@ def test_bad_messages_are_skipped_and_counted(tmp_path):
     assert len(report.warnings) == 1
 
 
-@pytest.mark.parametrize(
-    "schema", [b"float32 nothing", b"\xff\xfe\0", b"string ranges", b"x" * 999]
-)
-def test_a_wrong_schema(schema, tmp_path):
-    ros = Ros()
+@pytest.mark.parametrize("kind", MAKERS)
+def test_one_bad_scan_in_a_hundred(kind, tmp_path):
+    """A sweep of one beam in every format, and angles that are none where there are any."""
+    bad = {
+        13: replace(SCANS[13], ranges_m=SCANS[13].ranges_m[:1]),
+        14: replace(SCANS[14], angle_increment_rad=np.nan),
+    }
+    mixed = [bad.get(index, scan) for index, scan in enumerate(SCANS)]
+    if kind in ("carmen flaser", "carmen.gz", "carmen.zst"):
+        mixed[14] = bad[13]
+    found, report = read(MAKERS[kind](tmp_path / "log", mixed))
+    assert [scan.stamp_ns for scan in found] == [
+        scan.stamp_ns for index, scan in enumerate(SCANS) if index not in bad
+    ]
+    assert (report.scans_skipped, report.truncated) == (2, False)
+    assert sum("skipped" in warning for warning in report.warnings) == 1
+
+
+WRONG = [b"float32 nothing", b"\xff\xfe\0", b"string ranges", b"x" * 999, b""]
+ENCODINGS = [(Ros(), "ros2msg"), (Ros(), "ros2idl"), (Ros(is_ros1=True), "ros1msg")]
+
+
+@pytest.mark.parametrize("schema", WRONG)
+@pytest.mark.parametrize(("ros", "encoding"), ENCODINGS, ids=lambda value: str(value)[:20])
+def test_a_wrong_schema(schema, ros, encoding, tmp_path):
     path = tmp_path / "log"
-    path.write_bytes(ros_mcap(messages_of(SCANS, ros), ros, schemas={SCAN: schema}))
+    messages = messages_of(SCANS, ros)
+    path.write_bytes(ros_mcap(messages, ros, encoding=encoding, schemas={SCAN: schema}))
     found, report = try_to_read(path)
     assert report.scans_skipped == 80 or len(found) == 80
+
+
+@pytest.mark.parametrize("kind", ["bag", "lone db3"])
+def test_a_definition_overwritten(kind, whole, tmp_path):
+    """The definition beside the messages is no definition, or one of something else."""
+    path = tmp_path / "log"
+    for word in (b"float32 angle_min", b"float32[] ranges", b"std_msgs/Header header"):
+        data = whole(kind)
+        assert word in data
+        for wrong in (b"x" * len(word), b"string[] " + b"y" * (len(word) - 9), bytes(len(word))):
+            path.write_bytes(data.replace(word, wrong))
+            found, report = try_to_read(path)
+            assert report is None or report.scans_skipped == 80 or len(found) == 80
 
 
 def test_bad_lines_are_skipped_and_counted(tmp_path):
