@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from bsmap_cli.evaluation.occupancy import FREE, OCCUPIED, Occupancy
 from bsmap_cli.evaluation.pose_arrays import nearest_stamps
-from bsmap_cli.exchange.flatten import TOLERANCE_M, polylines
+from bsmap_cli.exchange.flatten import TOLERANCE_M
+from bsmap_cli.exchange.line_colours import LINE_PIXELS, coloured_lines
 from bsmap_cli.exchange.mcap_file import McapFile
 from bsmap_cli.exchange.nav2 import selected_occupancy
 from bsmap_cli.exchange.scan_messages import BASE_FRAME, ScanMessages
@@ -19,8 +20,6 @@ from bsmap_cli.exchange.scene_schema import LINE_STRIP, SCENE_UPDATE, SCENE_UPDA
 from bsmap_cli.exchange.selection import SelectedLevel, Selection
 from bsmap_cli.sensor.scan import Scan
 
-LINE_PIXELS = 2.0
-PALE, STRONG = (0.55, 0.72, 0.85), (0.05, 0.25, 0.5)
 _SECOND_NS = 1_000_000_000
 
 
@@ -157,28 +156,19 @@ class _Messages:
 def _line_strips(
     selected: SelectedLevel, max_weight: int, tolerance_m: float
 ) -> list[dict[str, Any]]:
-    level = selected.level
-    rows = level.offsets()
-    strips = []
-    lines = polylines(selected, tolerance_m)
-    for curve, line in zip(selected.pieces.curve.tolist(), lines, strict=True):
-        weights = level.weights[rows[curve] : rows[curve + 1]]
-        share = min(float(weights[weights > 0].mean()) / max(max_weight, 1), 1.0)
-        colour = [a + share * (b - a) for a, b in zip(PALE, STRONG, strict=True)]
-        points = np.round(line, 5).tolist()
-        strips.append(
-            {
-                "type": LINE_STRIP,
-                "pose": {
-                    "position": {"x": 0.0, "y": 0.0, "z": 0.0},
-                    "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-                },
-                "thickness": LINE_PIXELS,
-                "scale_invariant": True,
-                "points": [{"x": x, "y": y, "z": 0.0} for x, y in points],
-                "color": {**dict(zip("rgb", colour, strict=True)), "a": 1.0},
-                "colors": [],
-                "indices": [],
-            }
-        )
-    return strips
+    return [
+        {
+            "type": LINE_STRIP,
+            "pose": {
+                "position": {"x": 0.0, "y": 0.0, "z": 0.0},
+                "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+            },
+            "thickness": LINE_PIXELS,
+            "scale_invariant": True,
+            "points": [{"x": x, "y": y, "z": 0.0} for x, y in np.round(line, 5).tolist()],
+            "color": {**dict(zip("rgb", colour, strict=True)), "a": 1.0},
+            "colors": [],
+            "indices": [],
+        }
+        for line, colour in coloured_lines(selected, max_weight, tolerance_m)
+    ]

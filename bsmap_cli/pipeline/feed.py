@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from bsmap_cli.errors import LogError
 from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.sensor.scan import Scan
+
+if TYPE_CHECKING:
+    from bsmap_cli.mapping.map_document import MapDocument
+    from bsmap_cli.sensor.trajectory import Trajectory
+    from bsmap_cli.slam.slam import Slam
 
 
 class Progress(Protocol):
@@ -22,6 +27,16 @@ class Progress(Protocol):
 
     def stage(self, name: str) -> None:
         """The run turns to another task."""
+
+
+class Onlooker(Protocol):
+    """Who is shown a run while it goes on."""
+
+    def scan(self, scan: Scan, slam: Slam) -> None:
+        """A scan is through."""
+
+    def finished(self, document: MapDocument, trajectory: Trajectory) -> None:
+        """The map is finished."""
 
 
 class Silent:

@@ -20,7 +20,7 @@ from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.pipeline.feed import Feed, Progress, Silent
+from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
 from bsmap_cli.sensor.pose_track import PoseTrack
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
@@ -92,8 +92,15 @@ def run_map(
     )
 
 
-def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = None) -> Run:
+def run_slam(
+    reader: LogReader,
+    settings: Settings,
+    progress: Progress | None = None,
+    onlooker: Onlooker | None = None,
+) -> Run:
     """Sec. IV and beyond: a map and a trajectory from scans alone.
+
+    onlooker : shown every scan and the result; it changes neither.
 
     Raises
     ------
@@ -104,9 +111,13 @@ def run_slam(reader: LogReader, settings: Settings, progress: Progress | None = 
     slam = Slam(_settings_for(SlamSettings, settings))
     for scan in feed:
         slam.process(scan)
+        if onlooker is not None:
+            onlooker.scan(scan, slam)
     progress.stage("closing loops and building the final map")
     result = slam.finish()
     document, trajectory = _in_first_frame(result.document, result.trajectory)
+    if onlooker is not None:
+        onlooker.finished(document, trajectory)
     seconds = dict(slam.seconds)
     lost = len(result.figures["tracking_lost"])
     return _finished(

@@ -24,6 +24,7 @@ from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.slam_settings import SlamSettings
+from bsmap_cli.slam.slam_view import SlamView, view_of
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.tracked_map import tracked_levels
 
@@ -133,6 +134,13 @@ class Slam:
         if lost:
             self._lost[-1]["scans"] += 1
         self._was_lost = lost
+
+    def view(self) -> SlamView | None:
+        """How the run stands; None before the first scan."""
+        if self._local is None or self._closer is None:
+            return None
+        pose_local = SE2.from_array(self._log.poses[-3:])
+        return view_of(self._local, self._closer.graph.poses, pose_local)
 
     def finish(self) -> SlamResult:
         """Solve for all poses, build the map once more with them, and give every scan its pose."""

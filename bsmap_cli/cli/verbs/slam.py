@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bsmap_cli.cli.inputs import log_sources
+from bsmap_cli.cli.live import LiveFlags
 from bsmap_cli.cli.mapmaking import LogFlags, MakingFlags, make_map
 from bsmap_cli.cli.options import Logs, ReadFlags, SensorFlags, SettingsFlags, TalkFlags
 
@@ -14,6 +15,7 @@ def run(
     read: ReadFlags,
     settings: SettingsFlags,
     sensor: SensorFlags,
+    live: LiveFlags,
     logs: Logs = None,
 ) -> int:
     """Make a map and a trajectory from a log.
@@ -31,8 +33,10 @@ def run(
       bsmap slam run.mcap -o map.bsm --traj map.tum
       bsmap slam bag_folder/ --odom none --set ladder=[0.2,0.1] --json -o map.bsm
       cat run.mcap | bsmap slam - -o - | bsmap stats -
+      bsmap slam run.mcap -o map.bsm --live
     """
     from bsmap_cli.pipeline import run_slam
 
     log = LogFlags(logs=log_sources(logs), read=read, settings=settings, sensor=sensor)
-    return make_map(run_slam, log, making, talk.talk())
+    voice = talk.talk()
+    return make_map(live.watched(run_slam, voice), log, making, voice)
