@@ -92,15 +92,6 @@ def _of_report(report: ReadReport) -> Iterator[Finding]:
 
 
 def _of_scans(statistics: ScanStatistics, report: ReadReport) -> Iterator[Finding]:
-    if statistics.count == 0:
-        yield Finding(
-            name="empty",
-            level="problem",
-            message="no scan can be used",
-            remedy="see the warnings, and the topics that bsmap info shows",
-            value=0.0,
-        )
-        return
     yield from _of_stamps(statistics, report)
     yield from _of_beams(statistics)
     yield from _of_motion(statistics, report)

@@ -28,9 +28,8 @@ class MessageLog(DrawnLog):
         containers: list[Container],
         options: ReadOptions,
     ) -> None:
-        super().__init__(sources)
+        super().__init__(name, sources, options)
         self._containers = containers
-        self._options = options
         self._preview = Preview(name, options)
         self._decoders: dict[Channel, tuple[Kind, Decoder]] = {}
         self._needed: frozenset[str | None] | None = None

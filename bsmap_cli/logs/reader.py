@@ -43,6 +43,7 @@ class ReadReport:
 
     scans_read : scans handed out.
     scans_skipped : scans, of the chosen topics, that could not be read.
+    first_fault : what was wrong with the first of them.
     truncated : part of the log is missing or damaged.
     odometry : what moves the base, in a few words.
     places_unknown : whether the place of a laser was neither in the log nor told.
@@ -53,11 +54,17 @@ class ReadReport:
 
     scans_read: int = 0
     scans_skipped: int = 0
+    first_fault: str = ""
     truncated: bool = False
     odometry: str = "none"
     places_unknown: bool = False
     recorded_after_s: tuple[float, float] | None = None
     warnings: list[str] = field(default_factory=list)
+
+    def skip_scan(self, fault: str) -> None:
+        """Count a scan that cannot be read."""
+        self.first_fault = self.first_fault or fault
+        self.scans_skipped += 1
 
     def warn(self, line: str) -> None:
         """Tell the user once."""
@@ -104,7 +111,10 @@ class LogReader(Protocol):
     def __exit__(self, *exc: object) -> None: ...
 
     def scans(self) -> Iterator[Scan]:
-        """The scans, one at a time; a bad one is counted in `report` and skipped."""
+        """The scans, one at a time; a bad one is counted in `report` and skipped.
+
+        Raises LogError where not a single one can be read, or the choice is the user's.
+        """
         ...
 
     def info(self) -> LogInfo:

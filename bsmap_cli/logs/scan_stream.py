@@ -191,7 +191,7 @@ class ScanStream:
         if kind in (Kind.SCAN, Kind.CLOUD):
             if topic not in self._topics:
                 return
-            self._report.scans_skipped += 1
+            self._report.skip_scan(str(error))
         if topic not in self._told:
             self._told.add(topic)
             self._report.warn(f"messages of {topic} are skipped, the first because: {error}")

@@ -49,15 +49,13 @@ class TextLog(DrawnLog):
     def __init__(
         self, name: str, sources: Sequence[Source], parser: TextParser, options: ReadOptions
     ) -> None:
-        super().__init__(sources)
+        super().__init__(name, sources, options)
         if options.odom not in ("auto", "none"):
             raise UsageError(
                 f"{name} is a {parser.format} log, its poses stand beside its scans:"
                 " --odom is auto or none"
             )
-        self._name = name
         self._parser = parser
-        self._options = options
 
     def _draw(self) -> Generator[Scan, None, None]:
         window = ScanWindow(self._options)
@@ -144,7 +142,7 @@ class TextLog(DrawnLog):
         )
 
     def _skip(self, error: BadMessageError) -> None:
-        self.report.scans_skipped += 1
+        self.report.skip_scan(str(error))
         if self.report.scans_skipped == 1:
             self.report.warn(f"lines of {self._name} are skipped, the first because: {error}")
 

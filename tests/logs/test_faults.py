@@ -31,7 +31,7 @@ A_CHUNK = 40  # scans
 
 
 def try_to_read(path):
-    """The scans before the fault, or none where the log is refused."""
+    """The scans before the fault, or none and no report where the log is refused."""
     try:
         return read(path)
     except BsmapError as error:
@@ -216,7 +216,7 @@ def test_a_wrong_schema(schema, ros, encoding, tmp_path):
     messages = messages_of(SCANS, ros)
     path.write_bytes(ros_mcap(messages, ros, encoding=encoding, schemas={SCAN: schema}))
     found, report = try_to_read(path)
-    assert report.scans_skipped == 80 or len(found) == 80
+    assert report is None or len(found) == 80
 
 
 @pytest.mark.parametrize("kind", ["bag", "lone db3"])
@@ -229,7 +229,7 @@ def test_a_definition_overwritten(kind, whole, tmp_path):
         for wrong in (b"x" * len(word), b"string[] " + b"y" * (len(word) - 9), bytes(len(word))):
             path.write_bytes(data.replace(word, wrong))
             found, report = try_to_read(path)
-            assert report is None or report.scans_skipped == 80 or len(found) == 80
+            assert report is None or len(found) == 80
 
 
 def test_bad_lines_are_skipped_and_counted(tmp_path):

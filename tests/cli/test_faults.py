@@ -1,0 +1,103 @@
+"""Damaged inputs through the installed command: exit code, one line a loss, what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from bsmap_cli.logs.open_log import open_log
+from bsmap_cli.logs.reader import ReadOptions
+from tests.cli.tool import bsmap, message, names
+from tests.logs.making import MAKERS, SCAN, Ros, messages_of, ros_mcap, some_scans
+
+LOG = some_scans(80, 61)
+WITH_CHECKSUM = ("mcap zstd", "mcap lz4", "mcap no chunks", "mcap.gz", "csv.gz", "carmen.zst")
+
+
+def scans_in(path):
+    with open_log([path], ReadOptions()) as reader:
+        return [scan.stamp_ns for scan in reader.scans()]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The bytes of one log of each kind."""
+    folder = tmp_path_factory.mktemp("whole")
+    return {kind: MAKERS[kind](folder / kind, LOG).read_bytes() for kind in (*WITH_CHECKSUM, "bag")}
+
+
+def rewritten(folder, data, *flags):
+    """`bsmap scans` of a log: the command, and the stamps of the scans it wrote."""
+    (folder / "log").write_bytes(data)
+    ran = bsmap("scans", "log", "-o", "out.csv", "--force", *flags, cwd=folder)
+    wrote = scans_in(folder / "out.csv") if (folder / "out.csv").exists() else None
+    return ran, wrote
+
+
+@pytest.mark.parametrize("kind", WITH_CHECKSUM)
+@pytest.mark.parametrize("how", ["cut", "flip"])
+def test_damage_that_a_checksum_tells_is_exit_3(how, kind, whole, tmp_path):
+    data = bytearray(whole[kind])
+    middle = len(data) // 2
+    if how == "cut":
+        del data[middle:]
+    else:
+        data[middle] ^= 0x55
+    ran, wrote = rewritten(tmp_path, data)
+    if kind.endswith("zst"):  # its one block is all or nothing
+        assert ran.returncode in (1, 3)
+        return
+    assert ran.returncode == 3, ran.stderr
+    assert "damaged" in ran.stderr.decode()
+    assert 10 < len(wrote) < len(LOG) + (kind == "mcap no chunks")
+    assert set(wrote) <= {scan.stamp_ns for scan in LOG}
+
+
+def test_a_cut_bag_is_exit_3(whole, tmp_path):
+    ran, wrote = rewritten(tmp_path, whole["bag"][: len(whole["bag"]) // 2])
+    assert ran.returncode == 3
+    assert wrote == [scan.stamp_ns for scan in LOG[: len(wrote)]]
+
+
+@pytest.mark.parametrize("kind", ["mcap zstd", "mcap json", "bag bz2", "carmen robotlaser", "csv"])
+def test_bad_scans_are_exit_3_with_their_number(kind, tmp_path):
+    bad = replace(LOG[7], ranges_m=LOG[7].ranges_m[:1])
+    MAKERS[kind](tmp_path / "log", [*LOG[:7], bad, *LOG[8:]])
+    ran = bsmap("scans", "log", "-o", "out.csv", cwd=tmp_path)
+    assert ran.returncode == 3
+    assert "1 scans could not be read" in ran.stderr.decode()
+    assert scans_in(tmp_path / "out.csv") == [s.stamp_ns for s in LOG if s is not LOG[7]]
+
+
+def test_strict_turns_a_loss_into_a_failure_without_a_file(whole, tmp_path):
+    ran, wrote = rewritten(tmp_path, whole["mcap zstd"][:-9000], "--strict")
+    assert (ran.returncode, wrote) == (1, None)
+    assert names(tmp_path) == ["log"]
+
+
+@pytest.mark.parametrize("verb", [["slam", "-o", "m.bsm"], ["scans", "-o", "out.mcap"], ["check"]])
+def test_a_log_of_which_no_scan_can_be_read(verb, tmp_path):
+    ros = Ros()
+    log = ros_mcap(messages_of(LOG, ros), ros, schemas={SCAN: b"string ranges"})
+    (tmp_path / "log").write_bytes(log)
+    ran = bsmap(verb[0], "log", *verb[1:], cwd=tmp_path)
+    assert ran.returncode == 1
+    assert message(ran).startswith("error: none of the scans of log can be read (80 tried)")
+    assert names(tmp_path) == ["log"]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("how", ["cut", "flip"])
+def test_a_damaged_map_is_refused_with_its_place(how, share, here):
+    data = bytearray((here / "map.bsm").read_bytes())
+    at = int(share * len(data))
+    if how == "cut":
+        del data[at:]
+    else:
+        data[at] ^= 0x10
+    (here / "bad.bsm").write_bytes(data)
+    ran = bsmap("stats", "bad.bsm", cwd=here)
+    assert ran.returncode == 1
+    assert message(ran).startswith("error: bad.bsm: ")
+    assert "byte" in message(ran)
