@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +16,16 @@ BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], np.uin
 FIRST_LETTER = 0x2800
 
 
-def braille_map(levels: Sequence[MapLevel], *, columns: int = 60, rows: int = 24) -> list[str]:
-    """Lines of at most `columns` letters, `rows` of them at most; none where nothing is drawn.
+@dataclass(frozen=True, slots=True)
+class BraillePicture:
+    """Lines of braille letters, none where nothing is drawn; letter_m : width of a letter [m]."""
+
+    lines: list[str]
+    letter_m: float
+
+
+def braille_map(levels: Sequence[MapLevel], *, columns: int = 60, rows: int = 24) -> BraillePicture:
+    """Lines of at most `columns` letters, `rows` of them at most.
 
     A dot is set where a curve passes; both axes have one scale (letters are twice as high as
     wide), y points up.
@@ -25,7 +34,7 @@ def braille_map(levels: Sequence[MapLevel], *, columns: int = 60, rows: int = 24
         [np.zeros((0, 2)), *(sample_level(level, level.knot_step_m).points for level in levels)]
     )
     if not len(points):
-        return []
+        return BraillePicture([], 0.0)
     low, high = points.min(axis=0), points.max(axis=0)
     across, down = columns * DOTS_ACROSS, rows * DOTS_DOWN
     dot_m = max((high[0] - low[0]) / (across - 1), (high[1] - low[1]) / (down - 1), 1e-9)
@@ -39,4 +48,5 @@ def braille_map(levels: Sequence[MapLevel], *, columns: int = 60, rows: int = 24
     np.bitwise_or.at(letters, (row // DOTS_DOWN, column // DOTS_ACROSS), bits)
     used = letters[: int(row.max()) // DOTS_DOWN + 1]
     lines = ["".join(chr(FIRST_LETTER + int(letter)) for letter in line) for line in used]
-    return [line.rstrip(chr(FIRST_LETTER)) for line in lines]
+    shown = [line.rstrip(chr(FIRST_LETTER)) for line in lines]
+    return BraillePicture(shown, DOTS_ACROSS * float(dot_m))

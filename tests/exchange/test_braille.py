@@ -1,6 +1,7 @@
 """The picture in the terminal, read back dot by dot."""
 
 import numpy as np
+import pytest
 
 from bsmap_cli.exchange.braille import braille_map
 from tests.exchange.exported import distances, drawn_lines
@@ -24,7 +25,9 @@ def dots(lines):
 
 def test_dots_lie_on_the_curves_and_curves_on_dots():
     level = room_document().finest
-    lines = braille_map([level], columns=40, rows=20)
+    picture = braille_map([level], columns=40, rows=20)
+    lines = picture.lines
+    assert picture.letter_m == pytest.approx(2 * 6.0 / 79)
     assert len(lines) <= 20
     assert max(map(len, lines)) == 40
     found = dots(lines)
@@ -39,16 +42,16 @@ def test_dots_lie_on_the_curves_and_curves_on_dots():
 
 def test_y_points_up():
     level = make_level([line_points((0, 0), (2, 2), 0.1)])
-    found = dots(braille_map([level], columns=10, rows=10))
+    found = dots(braille_map([level], columns=10, rows=10).lines)
     assert np.corrcoef(found.T)[0, 1] < -0.99
 
 
 def test_tall_maps_keep_within_the_rows():
     level = make_level([line_points((0, 0), (0, 30), 0.1)])
-    lines = braille_map([level], columns=40, rows=8)
+    lines = braille_map([level], columns=40, rows=8).lines
     assert len(lines) == 8
     assert all(line == lines[0] for line in lines)
 
 
 def test_nothing_drawn_no_lines():
-    assert braille_map([make_level([])]) == []
+    assert braille_map([make_level([])]).lines == []

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Annotated
 
 from bsmap_cli.cli.inputs import map_source, read_map_file
-from bsmap_cli.cli.options import Json, MapIn, TalkFlags
+from bsmap_cli.cli.options import Json, MapIn, TalkFlags, option
+from bsmap_cli.cli.picture import can_show, print_picture
 from bsmap_cli.cli.report import print_json, print_rows, print_table, size
+from bsmap_cli.cli.talk import is_terminal
+from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from bsmap_cli.evaluation.map_statistics import MapStatistics
 
+TEXT_LINES = 11  # of the report beside its levels, which stay in view with the picture
 
-def run(*, talk: TalkFlags, map_: MapIn = None, json: Json = False) -> None:
+
+def run(
+    *,
+    talk: TalkFlags,
+    map_: MapIn = None,
+    picture: Annotated[
+        bool | None,
+        option(
+            "--picture/--no-picture",
+            show_default=False,
+            help="Draw the map in braille letters, as large as the terminal; by default where "
+            "standard output is one.",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
     """Show the size of a map, its curves and control points, beside a grid of the same place.
 
     The payload is what the curves of the finest level take: 16 bytes a curve, 8 a knot vector
@@ -24,14 +44,20 @@ def run(*, talk: TalkFlags, map_: MapIn = None, json: Json = False) -> None:
     Example:
       bsmap stats map.bsm
       bsmap stats map.bsm --json
+      bsmap stats map.bsm --picture > map.txt
     """
     from bsmap_cli.evaluation.map_statistics import map_statistics
 
-    statistics = map_statistics(*read_map_file(map_source(map_)))
+    if picture and json:
+        raise UsageError("--picture does not go with --json: leave one of them out")
+    document, sizes = read_map_file(map_source(map_))
+    statistics = map_statistics(document, sizes)
     if json:
         print_json(statistics.as_json())
         return
     voice = talk.talk()
+    if is_terminal(sys.stdout) and can_show(sys.stdout) if picture is None else picture:
+        print_picture(document.chosen_levels(), beside=len(statistics.levels) + TEXT_LINES)
     print_rows(_rows(statistics), voice)
     header = ("knot step", "curves", "control points", "bytes", "length")
     rows = [
