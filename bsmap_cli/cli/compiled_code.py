@@ -14,10 +14,12 @@ from bsmap_cli.cli.talk import Talk
 
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 FOR_ONCE = "bsmap-once-"
+ROOM_BYTES = 32 << 20
+"""Several times what the compiled code takes: a full disk must not end a run."""
 
 
 def keep_compiled_code(talk: Talk, environment: MutableMapping[str, str] = os.environ) -> None:
-    """Give the compiler a folder for this run, where neither package nor home can be written."""
+    """Give the compiler a folder for this run, where neither package nor home has room."""
     if CACHE_VARIABLE in environment or _can_be_made(Path(bsmap_cli.__file__).parent):
         return
     home = Path(os.path.expanduser("~"))
@@ -37,7 +39,9 @@ def compiled_note(seconds: float, environment: Mapping[str, str] = os.environ) -
 
 
 def _can_be_made(folder: Path) -> bool:
-    """Whether the folder, or the nearest one above it that exists, can be written."""
+    """Whether the folder, or the nearest one above it that exists, can be written and has room."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
-    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
+    if not (folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)):
+        return False
+    return shutil.disk_usage(folder).free >= ROOM_BYTES

@@ -91,11 +91,12 @@ def _parser_message(error: Any) -> str:
 def _remedy(error: OSError) -> str:
     import errno
 
-    return {
-        errno.ENOSPC: ": make room, or write elsewhere with --output",
-        errno.EDQUOT: ": make room, or write elsewhere with --output",
-        errno.EROFS: ": write elsewhere with --output",
-    }.get(error.errno or 0, "")
+    elsewhere = "write elsewhere with --output"
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if error.filename:
+            return f": make room, or {elsewhere}"
+        return ": make room for output, temporary files (TMPDIR) and code (NUMBA_CACHE_DIR)"
+    return f": {elsewhere}" if error.errno in (errno.EROFS, errno.EFBIG) else ""
 
 
 def _pipe_was_closed(error: BaseException | None) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import sqlite3
 import tempfile
@@ -10,6 +11,7 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
+from bsmap_cli.errors import LogError
 from bsmap_cli.logs.byte_streams import DamagedBytesError
 from bsmap_cli.logs.messages import Channel, ContainerIndex, RawMessage, normal_type
 from bsmap_cli.logs.reader import ReadReport
@@ -91,6 +93,13 @@ class SqliteContainer:
                     shutil.copyfileobj(stream, file, 1 << 20)
                 except DamagedBytesError:
                     self._is_cut = True
+                except OSError as error:
+                    if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                        raise
+                    raise LogError(
+                        f"no room for a copy of {self.name} in {folder}: set TMPDIR to a folder"
+                        " that has"
+                    ) from error
             if _is_cut_file(copy):
                 self._is_cut = True
                 with copy.open("r+b") as file:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import bsmap_cli
@@ -52,3 +53,11 @@ def test_else_it_is_kept_for_this_run(monkeypatch, capsys):
     assert CACHE_VARIABLE in capsys.readouterr().err
     assert "to keep that" in compiled_note(9.0, environment)
     assert "later runs start at once" in compiled_note(9.0, {CACHE_VARIABLE: "/mine"})
+
+
+def test_a_full_disk_is_no_place_for_it(monkeypatch):
+    full = shutil.disk_usage("/")._replace(free=1 << 20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: full)
+    environment = {}
+    keep_compiled_code(Talk(), environment)
+    assert Path(environment[CACHE_VARIABLE]).is_dir()

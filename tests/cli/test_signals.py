@@ -71,3 +71,31 @@ def test_a_killed_run_leaves_nothing_that_looks_finished(tmp_path):
     assert ended == -signal.SIGKILL
     assert not (tmp_path / "campus.mcap").exists()
     assert all(name.startswith(".campus.mcap.") for name in names(tmp_path))
+
+
+@pytest.mark.parametrize("after_s", [0.3, 1.0, 2.5])
+def test_killed_in_the_middle_of_slam_there_is_no_map(after_s, tmp_path):
+    (tmp_path / "old.tum").write_text("old")
+    command = ("slam", SAMPLES / "loop.csv.gz", "-q", "-o", "map.bsm", "--traj", "old.tum", "-f")
+    ended, _ = interrupted(tmp_path, signal.SIGKILL, after_s, *command)
+    assert ended == -signal.SIGKILL
+    assert names(tmp_path) == ["old.tum"]
+    assert (tmp_path / "old.tum").read_text() == "old"
+
+
+def test_killed_while_the_files_are_written_none_appears(tmp_path):
+    code = (
+        "import os, signal\n"
+        "from bsmap_cli.cli.outputs import Outputs\n"
+        "with Outputs(force=False) as outputs:\n"
+        "    outputs.add('map.bsm').open().write(b'x' * 1_000_000)\n"
+        "    outputs.add('t.tum').open().write(b'y' * 1_000_000)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    ended = subprocess.run([BSMAP.with_name("python"), "-c", code], cwd=tmp_path, check=False)
+    assert ended.returncode == -signal.SIGKILL
+    left = names(tmp_path)
+    assert len(left) == 2
+    assert all(
+        name.startswith((".map.bsm.", ".t.tum.")) and name.endswith(".part") for name in left
+    )
