@@ -16,18 +16,17 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
+from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain, spacing_weights
 from bsmap_cli.mapping.level_arrays import LevelArrays
-from bsmap_cli.mapping.merging import merge_run
+from bsmap_cli.mapping.merging import extend_rows
 from bsmap_cli.mapping.span_index import EMPTY, cell_key, find_slot, remove_span
 
 SAMPLES = 4  # a knot step
 COVER_STEPS, COVER_COSINE = 0.5, 0.866  # runs together: within half a knot step and 30 degrees
 ABSORBED = 0.8  # covered share at which a curve goes altogether
-JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = (
-    1.0,
-    0.25,
-    0.94,
-)  # gap along and aside [knot steps], 20 degrees
+# gap along and aside [knot steps], 20 degrees
+JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = 1.0, 0.25, 0.94
+JOIN_SAMPLES, JOIN_TAIL, JOIN_PENALTY = 8, 8.0, 1e-6  # a knot step; knot steps before the seam
 
 
 @njit(cache=True)
@@ -167,47 +166,71 @@ def _ends(curve_map: CurveMap) -> tuple[NDArray[np.int64], Points, Points]:
     return live, points, tangents
 
 
-def _join(curve_map: CurveMap, first: int, second: int, along_m: float, max_weight: float) -> None:
-    """Let curve `second` go on at the end of `first`, which it meets after `along_m`."""
-    step = curve_map.knot_step_m
-    length = curve_map.arrays.support[second, 1] - curve_map.arrays.support[second, 0]
+def _samples(curve_map: CurveMap, curve: int, start: float, end: float) -> tuple[Vector, Points]:
+    """Parameters from `start` to `end` [lattice units] and the points of a curve there."""
+    u = np.linspace(start, end, max(8, math.ceil(JOIN_SAMPLES * (end - start))))
+    points, tangents = np.empty((len(u), 2)), np.empty((len(u), 2))
+    sample_curve(curve_map.arrays, curve_map.matrix, curve, u, points, tangents)
+    return u, points
+
+
+def _join(curve_map: CurveMap, first: int, second: int, along_m: float) -> None:
+    """Let curve `second` go on at the end of `first`, which it meets after `along_m`.
+
+    The end of `first` and all of `second` are sampled and fitted together. The control points that
+    `first` has beyond its end take no part: they may belong to what was cut off.
+    """
     curve_map.reserve(2 * int(curve_map.arrays.count[first] + curve_map.arrays.count[second]) + 64)
-    arrays = curve_map.arrays
-    n = max(8, math.ceil(8 * length))
-    own_u = np.linspace(arrays.support[second, 0], arrays.support[second, 1], n)
-    points, tangents = np.empty((n, 2)), np.empty((n, 2))
-    sample_curve(arrays, curve_map.matrix, second, own_u, points, tangents)
-    end_u = arrays.support[first, 1]
-    u = end_u + along_m / step + own_u - own_u[0]
-    keep = u > end_u + 0.05
-    base = int(arrays.offset[second] - arrays.first[second])
-    middle = base + np.floor(own_u[keep]).astype(int) - curve_map.degree // 2
-    weights = arrays.weights[np.clip(middle, base + arrays.first[second], None)]
-    old_end = int(arrays.first[first] + arrays.count[first])
-    seen = int(max(arrays.seen[first], arrays.seen[second]))
-    if keep.sum() < 2 or not merge_run(
-        arrays,
-        curve_map.matrix,
-        step,
-        first,
-        u[keep],
-        points[keep],
-        np.full(int(keep.sum()), length / n),
-        max_weight,
-        1e-6,
-        math.inf,
-        False,
+    arrays, matrix, degree = curve_map.arrays, curve_map.matrix, curve_map.degree
+    (start, end), (own_start, own_end) = arrays.support[[first, second]].tolist()
+    tail_u, tail = _samples(curve_map, first, max(start, end - JOIN_TAIL), end)
+    own_u, own = _samples(curve_map, second, own_start, own_end)
+    start_u = end + along_m / curve_map.knot_step_m
+    later_u = own_u - own_start + start_u
+    keep = later_u > end + 0.05
+    if keep.sum() < 2:
+        return
+    u, points = np.append(tail_u, later_u[keep]), np.concatenate((tail, own[keep]))
+    low, high = lattice_domain(u[0], u[-1])
+    count = high - low + degree
+    fitted, none, shares = np.empty((count, 2)), np.zeros((count, 2)), np.empty(len(u))
+    spacing_weights(u, 1.0, shares)
+    if not fit_control_points(
+        u, points, shares, matrix, low, JOIN_PENALTY, none, np.zeros(count), fitted
     ):
         return
-    arrays.seen[first] = seen
-    grown = int(arrays.first[first] + arrays.count[first])
-    for g in range(old_end - curve_map.degree, grown):
-        near = int(
-            np.argmin(np.abs(u[keep] - (g - 0.5 * (curve_map.degree - 1) + curve_map.degree)))
-        )
-        row = int(arrays.offset[first] + g - arrays.first[first])
-        arrays.weights[row] = max(arrays.weights[row], weights[near])
-    cut_curve(arrays, curve_map.matrix, step, second, 0.0, 0.0)
+    indices = np.arange(low - degree, high)
+    weights = _joined_weights(curve_map, first, second, indices, start_u)
+    # where `first` goes on before the samples, what they see in part alone stays as it is
+    new = indices >= (tail_u[0] if tail_u[0] > start else -math.inf)
+    extend_rows(arrays, first, int(indices[0]), high)
+    rows = int(arrays.offset[first] - arrays.first[first]) + indices[new]
+    arrays.points[rows], arrays.weights[rows] = fitted[new], weights[new]
+    arrays.seen[first] = max(arrays.seen[first], arrays.seen[second])
+    cut_curve(arrays, matrix, curve_map.knot_step_m, first, start, float(u[-1]))
+    cut_curve(arrays, matrix, curve_map.knot_step_m, second, 0.0, 0.0)
+
+
+def _joined_weights(
+    curve_map: CurveMap, first: int, second: int, indices: NDArray[np.int64], start_u: float
+) -> Vector:
+    """Weight of each control point of the joined curve, on which `second` begins at `start_u`."""
+    arrays = curve_map.arrays
+
+    def weights_of(curve: int, lattice_indices: Vector) -> Vector:
+        rows = np.round(lattice_indices).astype(int) - arrays.first[curve]
+        found: Vector = arrays.weights[
+            arrays.offset[curve] + np.clip(rows, 0, arrays.count[curve] - 1)
+        ]
+        return found
+
+    half = 0.5 * (curve_map.degree + 1)
+    end_u = arrays.support[first, 1]
+    before = weights_of(first, indices.astype(float))
+    behind = weights_of(second, indices - start_u + arrays.support[second, 0])
+    apart = indices + half - end_u  # from the middle of the support to the seam
+    both = np.maximum(before, behind)
+    return np.where(apart > half, behind, np.where(apart < -half, before, both))
 
 
 def _followers(curve_map: CurveMap) -> list[tuple[float, int, int, float]]:
@@ -232,21 +255,21 @@ def _followers(curve_map: CurveMap) -> list[tuple[float, int, int, float]]:
     return sorted(found)
 
 
-def _join_ends(curve_map: CurveMap, max_weight: float) -> int:
+def _join_ends(curve_map: CurveMap) -> int:
     """Join each end to the start that continues it best; how many were joined."""
     used: set[int] = set()
     for _, first, second, along in _followers(curve_map):
         if first not in used and second not in used:
             used.update((first, second))
-            _join(curve_map, first, second, along, max_weight)
+            _join(curve_map, first, second, along)
     return len(used) // 2
 
 
-def tidy(curve_map: CurveMap, *, max_weight: float, min_length: float) -> None:
+def tidy(curve_map: CurveMap, *, min_length: float) -> None:
     """Absorb duplicates and join what follows on, until nothing joins any more."""
     for _ in range(6):
         _absorb(curve_map.arrays, curve_map.matrix, curve_map.knot_step_m, min_length)
-        if not _join_ends(curve_map, max_weight):
+        if not _join_ends(curve_map):
             break
 
 

@@ -88,11 +88,7 @@ class Mapper:
                 )
         if self.settings.association.method == "curve":
             for level in self.levels:
-                tidy(
-                    level,
-                    max_weight=float(self.settings.merging.max_weight),
-                    min_length=self.settings.segmentation.min_length,
-                )
+                tidy(level, min_length=self.settings.segmentation.min_length)
         cap = self.settings.merging.max_weight
         return MapDocument(
             degree=self.settings.degree,

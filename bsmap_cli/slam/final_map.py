@@ -101,9 +101,5 @@ def final_map(
     for level in levels:
         if len(keyframes) >= FEW_KEYFRAMES:
             drop_unconfirmed(level, settings.final_map.min_views)
-        tidy(
-            level,
-            max_weight=float(settings.merging.max_weight),
-            min_length=settings.segmentation.min_length,
-        )
+        tidy(level, min_length=settings.segmentation.min_length)
     return poses, levels
