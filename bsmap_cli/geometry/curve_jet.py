@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 
 
-@njit(cache=True)
+@lean
 def curve_jet(
     points: Points, first: int, matrix: Points, u: float, polynomial: Points
 ) -> tuple[float, float, float, float]:

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@inlined
 def basis_weights(matrix: Array, f: float, weights: Array) -> None:
     """Write the d + 1 basis values at f into `weights`."""
     order = matrix.shape[0]
@@ -26,10 +27,19 @@ def basis_weights(matrix: Array, f: float, weights: Array) -> None:
         weights[a] = value
 
 
-@njit(cache=True)
+@inlined
 def span_polynomial(points: Array, row: int, matrix: Array, polynomial: Array) -> None:
     """Write the (d + 1, 2) power-basis coefficients of one span into `polynomial`."""
     order = matrix.shape[0]
+    if order == 4:  # the cubic, written out: it is asked for more often than anything else
+        for k in range(2):
+            p0, p1 = points[row, k], points[row + 1, k]
+            p2, p3 = points[row + 2, k], points[row + 3, k]
+            polynomial[0, k] = (p0 + 4.0 * p1 + p2) / 6.0
+            polynomial[1, k] = 0.5 * (p2 - p0)
+            polynomial[2, k] = 0.5 * (p0 - 2.0 * p1 + p2)
+            polynomial[3, k] = (p3 - p0 + 3.0 * (p1 - p2)) / 6.0
+        return
     for p in range(order):
         x = 0.0
         y = 0.0
@@ -41,7 +51,7 @@ def span_polynomial(points: Array, row: int, matrix: Array, polynomial: Array) -
         polynomial[p, 1] = y
 
 
-@njit(cache=True)
+@inlined
 def polynomial_jet(polynomial: Array, f: float) -> tuple[float, float, float, float, float, float]:
     """Position, first and second derivative of a span at f: x, y, dx, dy, ddx, ddy."""
     top = polynomial.shape[0] - 1
@@ -57,7 +67,7 @@ def polynomial_jet(polynomial: Array, f: float) -> tuple[float, float, float, fl
     return x, y, dx, dy, 2.0 * ddx, 2.0 * ddy
 
 
-@njit(cache=True)
+@inlined
 def foot_point(
     points: Array,
     matrix: Array,
@@ -96,7 +106,7 @@ def foot_point(
     return row, min(1.0, max(0.0, f))
 
 
-@njit(cache=True)
+@lean
 def solve_banded(band: Array, rhs: Array) -> bool:
     """Solve a symmetric positive definite banded system in place by Cholesky.
 
@@ -130,7 +140,7 @@ def solve_banded(band: Array, rhs: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@kernel
 def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:  # noqa: PLR0912
     """Eigenvalues (ascending) and eigenvectors (columns) of a symmetric 3 x 3 matrix, by Jacobi."""
     a = matrix.copy()
@@ -169,7 +179,7 @@ def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:  # n
                     vectors[k, j], vectors[k, j + 1] = vectors[k, j + 1], vectors[k, j]
 
 
-@njit(cache=True)
+@inlined
 def solve3(matrix: Array, rhs: Array, solution: Array) -> None:
     """Solve a symmetric positive definite 3 x 3 system by Cholesky."""
     l00 = math.sqrt(max(matrix[0, 0], 1e-300))

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.curve import Curve
 from bsmap_cli.geometry.curve_jet import curve_jet
 from bsmap_cli.geometry.se2 import Points, Vector
@@ -30,7 +30,7 @@ class AlignmentSettings:
     iterations: int = setting(5, "most Gauss-Newton steps", minimum=1)
 
 
-@njit(cache=True)
+@kernel
 def _align(
     map_points: Points,
     map_first: int,

@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.geometry.kernels import foot_point, polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -39,7 +39,7 @@ class AssociationSettings:
     )
 
 
-@njit(cache=True)
+@inlined
 def usable_rows(level: LevelArrays, curve: int, degree: int) -> tuple[int, int]:
     """First and last span row of a curve that data support."""
     offset = level.offset[curve]
@@ -49,7 +49,7 @@ def usable_rows(level: LevelArrays, curve: int, degree: int) -> tuple[int, int]:
     return offset + low, offset + max(high, low)
 
 
-@njit(cache=True)
+@lean
 def match_points(
     level: LevelArrays,
     matrix: Points,
@@ -60,6 +60,7 @@ def match_points(
     gate_m: float,
     curves: NDArray[np.int64],
     u: Vector,
+    polynomial: Points,
 ) -> None:
     """Write curve (-1: none) and parameter u of each point's foot point.
 
@@ -67,7 +68,6 @@ def match_points(
     between two curves that lie close together.
     """
     degree = matrix.shape[0] - 1
-    polynomial = np.empty((degree + 1, 2))
     for c in range(len(starts) - 1):
         row, f = -1, 0.0
         for j in range(starts[c], starts[c + 1]):

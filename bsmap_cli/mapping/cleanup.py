@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
@@ -29,7 +29,7 @@ JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = 1.0, 0.25, 0.94
 JOIN_SAMPLES, JOIN_TAIL, JOIN_PENALTY = 8, 8.0, 1e-6  # a knot step; knot steps before the seam
 
 
-@njit(cache=True)
+@kernel
 def sample_curve(
     level: LevelArrays, matrix: Points, curve: int, u: Vector, points: Points, tangents: Points
 ) -> None:
@@ -46,13 +46,13 @@ def sample_curve(
         tangents[j, 0], tangents[j, 1] = dx / norm, dy / norm
 
 
-@njit(cache=True)
+@kernel
 def _mean_weight(level: LevelArrays, curve: int) -> float:
     offset = level.offset[curve]
     return float(np.mean(level.weights[offset : offset + level.count[curve]]))
 
 
-@njit(cache=True)
+@inlined
 def _is_covered(
     level: LevelArrays,
     knot_step_m: float,
@@ -91,7 +91,7 @@ def _is_covered(
     return False
 
 
-@njit(cache=True)
+@lean
 def cut_curve(
     level: LevelArrays, matrix: Points, knot_step_m: float, curve: int, start: float, end: float
 ) -> None:
@@ -107,7 +107,7 @@ def cut_curve(
     refresh_spans(level, matrix, knot_step_m, curve, offset, offset + count)
 
 
-@njit(cache=True)
+@kernel
 def _absorb(level: LevelArrays, matrix: Points, knot_step_m: float, least: float) -> None:
     """Cut from each curve, the lightest first, the ends that heavier ones cover."""
     degree = matrix.shape[0] - 1

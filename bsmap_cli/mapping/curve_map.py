@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.curve import Curve
-from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.centroid_tracking import Tracks
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -35,14 +34,13 @@ def _empty_level(curves: int, rows: int, cells: int) -> LevelArrays:
     )
 
 
-@njit(cache=True)
+@lean
 def refresh_spans(
     level: LevelArrays, matrix: Points, knot_step_m: float, curve: int, begin: int, end: int
 ) -> None:
     """Index anew the spans of a curve that touch its rows `begin` .. `end` - 1."""
     degree = matrix.shape[0] - 1
     offset, count = level.offset[curve], level.count[curve]
-    polynomial = np.empty((degree + 1, 2))
     first = max(offset, begin - degree)
     for row in range(first, min(offset + count - degree, end)):
         span_u = float(level.first[curve] + degree + row - offset)
@@ -52,9 +50,12 @@ def refresh_spans(
         if not usable:
             remove_span(level, row)
             continue
-        span_polynomial(level.points, row, matrix, polynomial)
-        x0, y0 = polynomial[0, 0], polynomial[0, 1]
-        x1, y1, _, _, _, _ = polynomial_jet(polynomial, 1.0)
+        x0 = y0 = x1 = y1 = 0.0
+        for a in range(degree):  # at a knot the last basis function of a span is zero
+            x0 += matrix[a, 0] * level.points[row + a, 0]
+            y0 += matrix[a, 0] * level.points[row + a, 1]
+            x1 += matrix[a, 0] * level.points[row + 1 + a, 0]
+            y1 += matrix[a, 0] * level.points[row + 1 + a, 1]
         level.spans[row, 0] = 0.5 * (x0 + x1)
         level.spans[row, 1] = 0.5 * (y0 + y1)
         level.spans[row, 2] = 0.5 * (x1 - x0)
@@ -62,7 +63,7 @@ def refresh_spans(
         insert_span(level, row, knot_step_m)
 
 
-@njit(cache=True)
+@lean
 def _reindex(level: LevelArrays, matrix: Points, knot_step_m: float) -> None:
     """Fill an empty hash with all usable spans."""
     level.sizes[2] = 0

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import kernel, lean
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -76,11 +76,13 @@ def remove_unseen(
     sigma_m: float,
     settings: VisibilitySettings,
     min_length: float,
+    old_curves: int = 0,
 ) -> None:
     """Remove the parts of curves that the views, in order of time, contradict.
 
     A control point goes when all spans that it shapes are absent. `min_length` : what is left of
-    a curve and shorter goes too [knot steps].
+    a curve and shorter goes too [knot steps]. old_curves : so many, the first ones, come from a
+    map that was there before: their weights tell of views that are not among these.
     """
     arrays = curve_map.arrays
     rows = int(arrays.sizes[1])
@@ -90,6 +92,7 @@ def remove_unseen(
         look = look_at(curve_map, sight, pose, sigma_m)
         _count_hits(look, tally)
         looks.append(look)
+    _recall(arrays, curve_map.degree, old_curves, settings.leaving, tally)
     for (sight, _), look in zip(views, looks, strict=True):
         _weigh(look, sight.reach_m, tally, settings.leaving, settings.arriving, settings.tentative)
     absent, gone = np.zeros(rows, bool), np.zeros(rows, bool)
@@ -98,7 +101,25 @@ def remove_unseen(
         remove_points(curve_map, gone, min_length=min_length)
 
 
-@njit(cache=True)
+@lean
+def _recall(level: LevelArrays, degree: int, curves: int, leaving: float, tally: Tally) -> None:
+    """Count the views that made old curves: what their weights hold beyond the hits known."""
+    for curve in range(curves):
+        offset = level.offset[curve]
+        for row in range(offset, offset + level.count[curve] - degree):
+            lightest = math.inf
+            for k in range(row, row + degree + 1):
+                lightest = min(lightest, level.weights[k])
+            earlier = lightest - tally.hits[row]
+            if earlier < 1.0:
+                continue
+            tally.score[row] = min(leaving, earlier)
+            if tally.hits[row] == 0.0:  # from where it was seen is not known any more
+                tally.least_cosine[row], tally.farthest_m[row] = 0.0, math.inf
+            tally.hits[row] += earlier
+
+
+@kernel
 def _count_hits(look: Look, tally: Tally) -> None:
     """From where each span returns a beam: a glass pane does so only along its normal."""
     for i in range(len(look.rows)):
@@ -109,7 +130,7 @@ def _count_hits(look: Look, tally: Tally) -> None:
             tally.farthest_m[row] = max(tally.farthest_m[row], look.ranges_m[i])
 
 
-@njit(cache=True)
+@kernel
 def _weigh(
     look: Look, reach_m: float, tally: Tally, leaving: float, arriving: float, tentative: int
 ) -> None:
@@ -129,7 +150,7 @@ def _weigh(
             tally.score[row] = max(-arriving, tally.score[row] - miss)
 
 
-@njit(cache=True)
+@lean
 def _find_absent(
     level: LevelArrays, degree: int, score: Vector, leaving: float, absent: Flags
 ) -> None:
@@ -149,7 +170,7 @@ def _find_absent(
             absent[row] = judged and level.span_cell[row] >= 0
 
 
-@njit(cache=True)
+@lean
 def _gone_points(level: LevelArrays, degree: int, absent: Flags, gone: Flags) -> bool:
     """Mark the control points all of whose spans are absent, or not indexed; is there any?"""
     found = False

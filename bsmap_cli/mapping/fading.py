@@ -7,9 +7,9 @@ one, and a control point whose weight sinks to nothing goes. That needs no memor
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -36,7 +36,7 @@ def fade(
         remove_points(curve_map, gone, min_length=min_length)
 
 
-@njit(cache=True)
+@kernel
 def _lower_weights(level: LevelArrays, degree: int, look: Look, gone: NDArray[np.bool_]) -> bool:
     """alpha <- alpha - 1 where spans are missed and none is hit; marks those that sink to 0."""
     seen = np.zeros(len(gone), np.int8)

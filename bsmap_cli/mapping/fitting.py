@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from bsmap_cli.errors import FitError
 from bsmap_cli.geometry.basis import basis_matrix
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.curve import Curve
 from bsmap_cli.geometry.kernels import basis_weights, solve_banded
 from bsmap_cli.geometry.se2 import Points, Vector
@@ -41,7 +41,7 @@ class FittingSettings:
     )
 
 
-@njit(cache=True)
+@lean
 def chord_length_parameters(points: Points, start_u: float, knot_step_m: float, u: Vector) -> None:
     """Eq. (7) in lattice units: u_1 = `start_u`, u_j = u_(j-1) + |p_j - p_(j-1)| / Delta."""
     u[0] = start_u
@@ -50,14 +50,14 @@ def chord_length_parameters(points: Points, start_u: float, knot_step_m: float, 
         u[j] = u[j - 1] + chord / knot_step_m
 
 
-@njit(cache=True)
+@inlined
 def lattice_domain(first_u: float, last_u: float) -> tuple[int, int]:
     """First span and end of the knot vector t_i^k that carries [first_u, last_u]."""
     low = math.floor(first_u + SNAP)
     return low, max(math.ceil(last_u - SNAP), low + 1)
 
 
-@njit(cache=True)
+@lean
 def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
     """Share of one span that each point stands for: half the way to both neighbours, capped."""
     n = len(u)
@@ -67,7 +67,7 @@ def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
         weights[j] = 0.5 * (before + after)
 
 
-@njit(cache=True)
+@kernel
 def fit_rms(
     u: Vector, points: Points, weights: Vector, matrix: Points, first_span: int, fitted: Points
 ) -> float:
@@ -87,7 +87,7 @@ def fit_rms(
     return math.sqrt(squares / max(total, 1e-300))
 
 
-@njit(cache=True)
+@kernel
 def fit_control_points(  # noqa: PLR0912
     u: Vector,
     points: Points,
@@ -158,7 +158,7 @@ def fit_control_points(  # noqa: PLR0912
     return solve_banded(band, solution)
 
 
-@njit(cache=True)
+@kernel
 def arc_length_parameters(
     u: Vector, control_points: Points, matrix: Points, first_span: int, anchor: int, step_m: float
 ) -> None:

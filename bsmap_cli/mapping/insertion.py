@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
+import numpy as np
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import match_points
 from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.run_merging import merge_runs
 from bsmap_cli.mapping.runs import plan_runs
@@ -20,6 +25,38 @@ def rotate(pose: Vector, vectors: Points) -> Points:
     return np.asarray(vectors @ np.array([[cos, sin], [-sin, cos]]))
 
 
+@kernel
+def _place_and_plan(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    points_body: Points,
+    tangents_body: Points,
+    starts: NDArray[np.int64],
+    pose: Vector,
+    gate_m: float,
+    min_length_m: float,
+    min_points: int,
+    points: Points,
+    tangents: Points,
+    curves: NDArray[np.int64],
+    u: Vector,
+    runs: NDArray[np.int64],
+) -> int:
+    """Place the scan, eq. (2), match its points and cut it into runs; their number."""
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    for j in range(len(points)):
+        points[j, 0] = cos * points_body[j, 0] - sin * points_body[j, 1] + pose[0]
+        points[j, 1] = sin * points_body[j, 0] + cos * points_body[j, 1] + pose[1]
+        tangents[j, 0] = cos * tangents_body[j, 0] - sin * tangents_body[j, 1]
+        tangents[j, 1] = sin * tangents_body[j, 0] + cos * tangents_body[j, 1]
+    polynomial = np.empty((matrix.shape[0], 2))
+    match_points(
+        level, matrix, knot_step_m, points, tangents, starts, gate_m, curves, u, polynomial
+    )
+    return plan_runs(level, points, starts, curves, u, knot_step_m, min_length_m, min_points, runs)
+
+
 def insert_clusters(
     curve_map: CurveMap,
     clusters: Clusters,
@@ -27,37 +64,32 @@ def insert_clusters(
     settings: MappingSettings,
 ) -> None:
     """Match, fit and merge; frame of the map = frame of the pose."""
-    points = rotate(pose_map_body, clusters.points) + pose_map_body[:2]  # eq. (2)
     if settings.association.method == "centroid":
+        points = rotate(pose_map_body, clusters.points) + pose_map_body[:2]  # eq. (2)
         insert_tracked(curve_map, points, clusters.starts, settings)
         return
-    n = len(points)
+    n = len(clusters.points)
     if n == 0:
         return
     step = curve_map.knot_step_m
-    tangents = rotate(pose_map_body, clusters.tangents)
+    points, tangents = np.empty((n, 2)), np.empty((n, 2))
     curves, u = np.empty(n, np.int64), np.zeros(n)
-    match_points(
+    runs = np.empty((2 * n + 2, 5), np.int64)
+    count = _place_and_plan(
         curve_map.arrays,
         curve_map.matrix,
         step,
-        points,
-        tangents,
+        clusters.points,
+        clusters.tangents,
         clusters.starts,
+        pose_map_body,
         settings.association.track_dist * step,
-        curves,
-        u,
-    )
-    runs = np.empty((2 * n + 2, 5), np.int64)
-    count = plan_runs(
-        curve_map.arrays,
-        points,
-        clusters.starts,
-        curves,
-        u,
-        step,
         settings.segmentation.min_length * step,
         settings.segmentation.min_points,
+        points,
+        tangents,
+        curves,
+        u,
         runs,
     )
     done = 0

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import USABLE_WEIGHT, refresh_spans
@@ -53,7 +53,7 @@ class MergingSettings:
     )
 
 
-@njit(cache=True)
+@inlined
 def has_room(level: LevelArrays, rows: int) -> bool:
     """Can a curve grow or start that needs `rows` rows?"""
     return bool(
@@ -63,7 +63,7 @@ def has_room(level: LevelArrays, rows: int) -> bool:
     )
 
 
-@njit(cache=True)
+@lean
 def _claim_rows(level: LevelArrays, curve: int, first: int, count: int) -> int:
     """Give a curve fresh rows with room at both ends; returns its new offset."""
     slack = max(4, count // 2)
@@ -80,7 +80,7 @@ def _claim_rows(level: LevelArrays, curve: int, first: int, count: int) -> int:
     return int(low + slack)
 
 
-@njit(cache=True)
+@lean
 def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
     """Let a curve hold the lattice indices `first` .. `end` - 1 too; True if its rows moved.
 
@@ -98,7 +98,8 @@ def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
         offset = _claim_rows(level, curve, new_first, new_count)
         shift = offset + (old_first - new_first) - old_offset
         for row in range(old_offset, old_offset + old_count):
-            level.points[row + shift] = level.points[row]
+            level.points[row + shift, 0] = level.points[row, 0]
+            level.points[row + shift, 1] = level.points[row, 1]
             level.weights[row + shift] = level.weights[row]
     level.first[curve] = new_first
     level.count[curve] = new_count
@@ -110,7 +111,7 @@ def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
     return bool(moved)
 
 
-@njit(cache=True)
+@lean
 def _start_curve(level: LevelArrays, first: int, count: int) -> int:
     """A new curve without observations, eq. (12)."""
     curve = level.sizes[0]
@@ -123,7 +124,7 @@ def _start_curve(level: LevelArrays, first: int, count: int) -> int:
     return int(curve)
 
 
-@njit(cache=True)
+@kernel
 def observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: Vector) -> None:
     """omega_g = sum_j (ds_j / Delta) B_g(tau_j): 1 inside the data whatever their density."""
     order = matrix.shape[0]
@@ -136,7 +137,7 @@ def observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: 
             omega[span + a] += weights[j] * basis[a]
 
 
-@njit(cache=True)
+@lean
 def merge_fitted(
     level: LevelArrays,
     matrix: Points,
@@ -172,7 +173,7 @@ def merge_fitted(
         share = min(1.0, omega[i])
         old = level.weights[row]
         if old <= 0.0:
-            level.points[row] = fitted[i]
+            level.points[row, 0], level.points[row, 1] = fitted[i, 0], fitted[i, 1]
             level.weights[row] = max(share, LEAST_WEIGHT)
         else:
             new = min(max_weight, old + share)
@@ -189,7 +190,7 @@ def merge_fitted(
     return curve
 
 
-@njit(cache=True)
+@kernel
 def merge_run(
     level: LevelArrays,
     matrix: Points,

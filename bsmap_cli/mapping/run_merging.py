@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, kernel
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.fitting import (
     arc_length_parameters,
@@ -20,7 +20,7 @@ from bsmap_cli.mapping.merging import has_room, merge_run
 from bsmap_cli.mapping.runs import BEGIN, CURVE, END, KNOWN_BEGIN, KNOWN_END
 
 
-@njit(cache=True)
+@inlined
 def _advance(points: Points, tangents: Points, j: int) -> float:
     """Way [m] from point j - 1 to j along the smoothed direction: noise does not lengthen it."""
     dx, dy = points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1]
@@ -28,7 +28,7 @@ def _advance(points: Points, tangents: Points, j: int) -> float:
     return float((dx * tx + dy * ty) / (math.hypot(tx, ty) + 1e-300))
 
 
-@njit(cache=True)
+@kernel
 def _run_parameters(
     run: NDArray[np.int64],
     curves: NDArray[np.int64],
@@ -78,7 +78,7 @@ def _run_parameters(
         run_u[:] = arc_u
 
 
-@njit(cache=True)
+@kernel
 def merge_runs(
     level: LevelArrays,
     matrix: Points,

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
@@ -22,7 +22,7 @@ END_REACH = 3.0  # a run that comes this close to a curve's end may extend it [k
 CURVE, BEGIN, END, KNOWN_BEGIN, KNOWN_END = range(5)
 
 
-@njit(cache=True)
+@lean
 def _stretch_length(points: Points, begin: int, end: int) -> float:
     length = 0.0
     for j in range(begin + 1, end):
@@ -30,7 +30,7 @@ def _stretch_length(points: Points, begin: int, end: int) -> float:
     return length
 
 
-@njit(cache=True)
+@inlined
 def _same_run(u: Vector, points: Points, last: int, j: int, knot_step_m: float) -> bool:
     """Does matched point j go on where `last` was: forward by about the way between them?"""
     way = math.hypot(points[j, 0] - points[last, 0], points[j, 1] - points[last, 1]) / knot_step_m
@@ -38,7 +38,7 @@ def _same_run(u: Vector, points: Points, last: int, j: int, knot_step_m: float) 
     return bool(-0.5 <= advance <= 1.5 * way + 0.5)
 
 
-@njit(cache=True)
+@lean
 def _matched_runs(
     curves: NDArray[np.int64],
     u: Vector,
@@ -77,7 +77,7 @@ def _matched_runs(
     return count
 
 
-@njit(cache=True)
+@lean
 def plan_runs(
     level: LevelArrays,
     points: Points,

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.sensor.gate import Returns
 from bsmap_cli.settings import setting
@@ -79,7 +79,7 @@ class Clusters:
         return cls(points, tangents, counts, starts)
 
 
-@njit(cache=True)
+@lean
 def _segment(
     points: Points,
     ranges: Vector,
@@ -116,7 +116,7 @@ def _segment(
     return clusters
 
 
-@njit(cache=True)
+@lean
 def _thin(
     points: Points,
     returns: Vector,
@@ -151,7 +151,7 @@ def _thin(
     return n
 
 
-@njit(cache=True)
+@lean
 def _tangents(points: Points, starts: NDArray[np.int64], reach_m: float, tangents: Points) -> None:
     """Direction of the surface at each point, over neighbours at least `reach_m` away."""
     for c in range(len(starts) - 1):

@@ -9,30 +9,30 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
 EMPTY = -(2**62)
 
 
-@njit(cache=True)
+@inlined
 def cell_key(column: int, row: int) -> int:
     """One integer for a cell."""
     return (column << 31) ^ (row & 0x7FFFFFFF)
 
 
-@njit(cache=True)
+@inlined
 def find_slot(level: LevelArrays, key: int) -> int:
     """Slot of a cell in the hash, or the free slot where it belongs."""
     mask = len(level.cell_keys) - 1
-    slot = (key * 0x9E3779B97F4A7 >> 17) & mask
+    mixed = key * 0x9E3779B97F4A7
+    slot = (mixed ^ mixed >> 32) & mask  # the high bits alone know of column and row
     while level.cell_keys[slot] != key and level.cell_keys[slot] != EMPTY:
         slot = (slot + 1) & mask
     return slot
 
 
-@njit(cache=True)
+@inlined
 def remove_span(level: LevelArrays, row: int) -> None:
     """Take a span out of its cell; nothing happens where it is in none."""
     slot = level.span_cell[row]
@@ -48,7 +48,7 @@ def remove_span(level: LevelArrays, row: int) -> None:
     level.span_cell[row] = -1
 
 
-@njit(cache=True)
+@lean
 def insert_span(level: LevelArrays, row: int, knot_step_m: float) -> None:
     """Put a span into the cell of its middle, leaving the one it was in."""
     column = math.floor(level.spans[row, 0] / knot_step_m)
@@ -67,7 +67,7 @@ def insert_span(level: LevelArrays, row: int, knot_step_m: float) -> None:
     level.span_cell[row] = slot
 
 
-@njit(cache=True)
+@inlined
 def nearest_span(
     level: LevelArrays,
     knot_step_m: float,

@@ -14,13 +14,12 @@ the update, which throws the first observation away, and row 3 takes the weight 
 
 from __future__ import annotations
 
-from numba import njit
-
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
 
-@njit(cache=True)
+@lean
 def merge_by_table(
     level: LevelArrays,
     curve: int,
@@ -58,5 +57,5 @@ def merge_by_table(
         else:  # row 3
             taken = end > map_end
         if taken:
-            level.points[row] = fitted[i]
+            level.points[row, 0], level.points[row, 1] = fitted[i, 0], fitted[i, 1]
             level.weights[row] = 1.0

@@ -12,9 +12,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, kernel
 from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -66,7 +66,7 @@ class Look(NamedTuple):
     ranges_m: NDArray[np.float32]
 
 
-@njit(cache=True)
+@inlined
 def _sector(x: float, y: float) -> int:
     """Sector of a direction: steps of a square's outline, nearly even in angle, without atan2."""
     turn = y / (abs(x) + abs(y) + 1e-300)
@@ -77,7 +77,7 @@ def _sector(x: float, y: float) -> int:
     return min(SECTORS - 1, int(turn * (SECTORS / 4.0)))
 
 
-@njit(cache=True)
+@kernel
 def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
     """(WIDTHS, SECTORS) the longest beam within 2^w sectors to either side; -1 without any."""
     farthest = np.full((WIDTHS, SECTORS), -1.0)
@@ -99,7 +99,7 @@ def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
     return farthest
 
 
-@njit(cache=True)
+@kernel
 def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     """Does any beam come near a part of a curve that lies round (x, y)?"""
     vx, vy = x - fan.x, y - fan.y
@@ -115,7 +115,7 @@ def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     return bool(fan.farthest[w, _sector(vx, vy)] > r - 2.0 * radius_m)
 
 
-@njit(cache=True)
+@kernel
 def _judge_beams(
     fan: Fan,
     centre: float,
@@ -162,7 +162,7 @@ def _judge_beams(
     return DARK if dark > 0 else UNSEEN
 
 
-@njit(cache=True)
+@kernel
 def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[int, float, float]:
     """UNSEEN, HIT, MISS or DARK; cosine of the incidence; distance [m]."""
     vx, vy = spans[row, 0] - fan.x, spans[row, 1] - fan.y
@@ -192,14 +192,14 @@ def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[
     return verdict, cosine, r
 
 
-@njit(cache=True)
+@kernel
 def _longer(column: NDArray[Any], size: int) -> NDArray[Any]:
     longer = np.empty(size, column.dtype)
     longer[: len(column)] = column
     return longer
 
 
-@njit(cache=True)
+@kernel
 def _judge_level(
     level: LevelArrays,
     degree: int,

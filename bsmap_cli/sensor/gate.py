@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.sensor.scan import Ranges, Scan
 from bsmap_cli.settings import setting
@@ -68,7 +68,7 @@ def _beam_table(
     return np.cos(angles), np.sin(angles), used
 
 
-@njit(cache=True)
+@lean
 def _gather(
     ranges: Ranges,
     cosines: Vector,

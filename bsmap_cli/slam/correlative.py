@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import kernel, lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.slam.likelihood import CHANNELS, Likelihood
 
@@ -27,7 +27,7 @@ class Peak:
     score: float
 
 
-@njit(cache=True)
+@lean
 def _project(
     points: Points,
     tangents: Points,
@@ -48,7 +48,7 @@ def _project(
         cells[j, 2] = math.floor(turn + 0.5) % CHANNELS
 
 
-@njit(cache=True)
+@lean
 def _score(grids: NDArray[np.uint8], height: int, cells: Integers, dx: int, dy: int) -> float:
     """Mean likelihood of the points shifted by whole cells, or a bound of it above height 0."""
     _, _, rows, columns = grids.shape
@@ -60,7 +60,7 @@ def _score(grids: NDArray[np.uint8], height: int, cells: Integers, dx: int, dy: 
     return total / (255.0 * len(cells))
 
 
-@njit(cache=True)
+@kernel
 def _descend(
     grids: NDArray[np.uint8],
     cells: Integers,
@@ -112,7 +112,7 @@ def _descend(
     return found, found_x, found_y
 
 
-@njit(cache=True)
+@kernel
 def _search(
     grids: NDArray[np.uint8],
     points: Points,

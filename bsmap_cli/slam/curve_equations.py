@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.curve_jet import curve_jet
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.alignment import LEAST_OVERLAP
@@ -101,7 +101,7 @@ class PairSystem:
         return equations
 
 
-@njit(cache=True)
+@kernel
 def _sum_equations(
     level: LevelArrays,
     matrix: Points,

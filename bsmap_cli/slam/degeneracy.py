@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
 
-@njit(cache=True)
+@kernel
 def keep_unobserved(
     hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
 ) -> int:

@@ -12,9 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import kernel, lean
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
@@ -46,7 +46,7 @@ def sample_surfaces(curve_map: CurveMap, spacing_m: float) -> tuple[Points, Poin
     return points, directions
 
 
-@njit(cache=True)
+@kernel
 def _sample(
     control_points: Points,
     rows: NDArray[np.int64],
@@ -67,7 +67,7 @@ def _sample(
             n += 1
 
 
-@njit(cache=True)
+@lean
 def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> None:
     """Write each surface sample into the channels of its direction; points relative to the grid."""
     side = 2 * REACH_CELLS + 1
@@ -90,7 +90,7 @@ def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> Non
                         grid[channel, r, c] = np.uint8(value)
 
 
-@njit(cache=True)
+@lean
 def _pyramid(grids: Grid) -> None:
     """Fill heights 1 .. from height 0: the maximum over windows that double in size."""
     heights, channels, rows, columns = grids.shape

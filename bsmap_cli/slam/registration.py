@@ -11,9 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import (
     foot_point,
     polynomial_jet,
@@ -89,7 +89,41 @@ class RegistrationResult:
     points: int
 
 
-@njit(cache=True)
+@inlined
+def _match(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    row: int,
+    f: float,
+    steps: int,
+    px: float,
+    py: float,
+    tx: float,
+    ty: float,
+    polynomial: Points,
+) -> tuple[bool, int, float, float, float, float]:
+    """Foot point near f on span `row`: found or not, row, f, residual [m] and unit tangent there.
+
+    The residual is that along the normal (-uy, ux).
+    """
+    first_row, last_row = usable_rows(level, level.owner[row], matrix.shape[0] - 1)
+    row, f = foot_point(
+        level.points, matrix, row, f, first_row, last_row, px, py, steps, polynomial
+    )
+    x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
+    ex, ey = px - x, py - y
+    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + 1e-300)
+    ux, uy = dx * inverse, dy * inverse
+    found = (
+        abs(ex * ux + ey * uy) <= END_TOLERANCE * knot_step_m
+        and ux * tx + uy * ty >= MIN_COSINE
+        and level.span_cell[row] >= 0
+    )
+    return found, row, f, ey * ux - ex * uy, ux, uy
+
+
+@lean
 def _accumulate(  # noqa: PLR0915
     level: LevelArrays,
     matrix: Points,
@@ -106,49 +140,50 @@ def _accumulate(  # noqa: PLR0915
     hessian: Points,
     gradient: Vector,
     tally: Vector,
+    polynomial: Points,
 ) -> None:
     """Sum the normal equations of all matched points.
+
+    A point goes on from its foot point of the last step; a new one from its neighbour's, and the
+    index is asked only where that curve is not plainly the right one.
 
     tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
     information that noisy tangents feign along a straight wall.
     """
-    degree = matrix.shape[0] - 1
-    polynomial = np.empty((degree + 1, 2))
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
     inliers = squares = lever = total = feigned = 0.0
+    f = residual = ux = uy = 0.0
+    neighbour = -1
     for j in range(len(points)):
         qx = cos * points[j, 0] - sin * points[j, 1]
         qy = sin * points[j, 0] + cos * points[j, 1]
         px, py = qx + pose[0], qy + pose[1]
         tx = cos * tangents[j, 0] - sin * tangents[j, 1]
         ty = sin * tangents[j, 0] + cos * tangents[j, 1]
-        row, f = rows[j], places[j]
-        steps = 2
-        if row < 0:
-            row, f = nearest_span(level, knot_step_m, px, py, tx, ty, gate_m, MIN_COSINE)
-            steps = 3
-            if row < 0:
-                continue
-        first_row, last_row = usable_rows(level, level.owner[row], degree)
-        row, f = foot_point(
-            level.points, matrix, row, f, first_row, last_row, px, py, steps, polynomial
-        )
-        x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
-        ex, ey = px - x, py - y
-        speed = math.sqrt(dx * dx + dy * dy) + 1e-300
-        ux, uy = dx / speed, dy / speed
-        residual = ey * ux - ex * uy  # along the normal (-uy, ux)
-        beyond = abs(ex * ux + ey * uy) > END_TOLERANCE * knot_step_m
-        if (
-            beyond
-            or ux * tx + uy * ty < MIN_COSINE
-            or abs(residual) > gate_m
-            or level.span_cell[row] < 0
-        ):
-            rows[j] = -1
+        found = False
+        row = rows[j]
+        if row >= 0:
+            found, row, f, residual, ux, uy = _match(
+                level, matrix, knot_step_m, row, places[j], 1, px, py, tx, ty, polynomial
+            )
+            found = found and abs(residual) <= gate_m
+        else:
+            if neighbour >= 0:
+                found, row, f, residual, ux, uy = _match(
+                    level, matrix, knot_step_m, neighbour, f, 2, px, py, tx, ty, polynomial
+                )
+                found = found and abs(residual) <= inlier_m
+            if not found:
+                row, f = nearest_span(level, knot_step_m, px, py, tx, ty, gate_m, MIN_COSINE)
+                if row >= 0:
+                    found, row, f, residual, ux, uy = _match(
+                        level, matrix, knot_step_m, row, f, 2, px, py, tx, ty, polynomial
+                    )
+                    found = found and abs(residual) <= gate_m
+        neighbour = rows[j] = row if found else -1
+        if not found:
             continue
-        rows[j] = row
         places[j] = f
         ratio = residual / kernel_m
         root = 1.0 + ratio * ratio
@@ -177,7 +212,7 @@ def _accumulate(  # noqa: PLR0915
     tally[4] = feigned / (knot_step_m * knot_step_m)
 
 
-@njit(cache=True)
+@kernel
 def _register(
     level: LevelArrays,
     matrix: Points,
@@ -198,7 +233,7 @@ def _register(
 ) -> tuple[int, int]:
     """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
     rows, places = np.full(len(points), -1), np.empty(len(points))
-    gradient, system = np.empty(3), np.empty((3, 3))
+    gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
     start = pose.copy()
     found = 0
@@ -220,6 +255,7 @@ def _register(
             hessian,
             gradient,
             tally,
+            polynomial,
         )
         steps += 1
         for i in range(3):

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.sensor.simulator.world import Shapes, Table
 
@@ -70,7 +70,7 @@ def _bounds(shapes: Shapes) -> tuple[Vector, Vector]:
     return points.min(axis=0) - 10 * _MARGIN_M, points.max(axis=0) + 10 * _MARGIN_M
 
 
-@njit(cache=True)
+@inlined
 def _segment_meets_box(segment: Vector, low_x: float, low_y: float, side: float) -> bool:
     """Whether the segment's line passes the box; its extent is checked by the caller."""
     half = side / 2.0
@@ -81,7 +81,7 @@ def _segment_meets_box(segment: Vector, low_x: float, low_y: float, side: float)
     return bool(distance <= reach + _MARGIN_M * math.hypot(along_x, along_y))
 
 
-@njit(cache=True)
+@inlined
 def _circle_meets_box(arc: Vector, low_x: float, low_y: float, side: float) -> bool:
     """Whether the whole circle of the arc passes the box."""
     half = side / 2.0
@@ -91,7 +91,7 @@ def _circle_meets_box(arc: Vector, low_x: float, low_y: float, side: float) -> b
     return bool(nearest <= arc[2] + _MARGIN_M and farthest >= arc[2] - _MARGIN_M)
 
 
-@njit(cache=True)
+@lean
 def _sort_into_cells(grid: Grid, cursor: NDArray[np.int64], only_count: bool) -> None:
     """Count the shapes of cell c in cursor[c + 1], or write them from cursor[c] on."""
     segment_count = len(grid.segments)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.sensor.simulator.grid import Grid, grid_of
 from bsmap_cli.sensor.simulator.world import Shapes
@@ -16,7 +16,7 @@ Ray = tuple[float, float, float, float]  # x, y [m], unit vector ahead
 _ENDS = 1e-9  # of a segment's length: rays between two joined segments do not slip through
 
 
-@njit(cache=True)
+@inlined
 def _to_segment(segment: Vector, ray: Ray) -> float:
     """Distance along the ray to the segment, inf where it misses; parallel rays miss."""
     x, y, ahead_x, ahead_y = ray
@@ -32,7 +32,7 @@ def _to_segment(segment: Vector, ray: Ray) -> float:
     return float(distance)
 
 
-@njit(cache=True)
+@inlined
 def _to_arc(arc: Vector, ray: Ray) -> float:
     """Distance along the ray to the nearest point on the arc, inf where it misses."""
     x, y, ahead_x, ahead_y = ray
@@ -53,7 +53,7 @@ def _to_arc(arc: Vector, ray: Ray) -> float:
     return math.inf
 
 
-@njit(cache=True)
+@inlined
 def _entry(grid: Grid, ray: Ray) -> tuple[float, float]:
     """Distances at which the ray enters and leaves the grid; the first is larger: it misses."""
     x, y, ahead_x, ahead_y = ray
@@ -72,7 +72,7 @@ def _entry(grid: Grid, ray: Ray) -> tuple[float, float]:
     return enter, leave
 
 
-@njit(cache=True)
+@lean
 def _first_hit(grid: Grid, ray: Ray, reach: float) -> float:
     """Distance to the first surface up to `reach`, else inf: cell after cell along the ray."""
     x, y, ahead_x, ahead_y = ray
@@ -115,7 +115,7 @@ def _first_hit(grid: Grid, ray: Ray, reach: float) -> float:
     return nearest if nearest <= reach else math.inf
 
 
-@njit(cache=True)
+@lean
 def cast_rays(
     grid: Grid, poses: NDArray[np.float64], angles: Vector, reach_m: float, ranges: Vector
 ) -> None:

@@ -1,0 +1,41 @@
+"""How hot loops are compiled: once for this machine, kept on disk, by the rules of numpy.
+
+A division by zero gives inf or nan, as in numpy, so that no division carries a branch that could
+raise; products may be fused with sums.
+
+Each time compiled code takes an array out of a map level, numba counts one more reference to it,
+by an atomic addition that costs as much as a foot point. What runs point by point is therefore
+compiled without counting (`inlined`, `lean`) and must not allocate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+from numba import njit
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function on plain arrays and numbers, when it is first called."""
+    return cast(Function, njit(cache=True, error_model="numpy", fastmath={"contract"})(function))
+
+
+def lean(function: Function) -> Function:
+    """The same for a loop that allocates nothing: no references are counted in it."""
+    return cast(
+        Function,
+        njit(cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False)(function),
+    )
+
+
+def inlined(function: Function) -> Function:
+    """The same for what is done for one point, compiled into the loop that calls it."""
+    return cast(
+        Function,
+        njit(cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False, forceinline=True)(
+            function
+        ),
+    )
