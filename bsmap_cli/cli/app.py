@@ -28,6 +28,7 @@ VERBS = (
         "query",
         "sim",
         "scans",
+        "warmup",
     ),
     "config",
 )

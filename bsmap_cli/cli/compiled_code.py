@@ -11,6 +11,7 @@ from pathlib import Path
 
 import bsmap_cli
 from bsmap_cli.cli.talk import Talk
+from bsmap_cli.errors import BsmapError
 
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"
 FOR_ONCE = "bsmap-once-"
@@ -33,9 +34,32 @@ def keep_compiled_code(talk: Talk, environment: MutableMapping[str, str] = os.en
 
 def compiled_note(seconds: float, environment: Mapping[str, str] = os.environ) -> str:
     """What to say of the time that compiling took."""
-    for_once = Path(environment.get(CACHE_VARIABLE, "")).name.startswith(FOR_ONCE)
-    later = f"set {CACHE_VARIABLE} to keep that" if for_once else "later runs start at once"
+    later = "later runs start at once"
+    if _is_for_once(environment):
+        later = f"set {CACHE_VARIABLE} to keep that"
     return f"compiled for this machine in {seconds:.0f} s; {later}"
+
+
+def check_kept(environment: Mapping[str, str] = os.environ) -> None:
+    """Refuse to compile where that would be lost with the run.
+
+    Raises
+    ------
+    BsmapError : there is no folder for compiled code that can be written and has room.
+    """
+    folder = environment.get(CACHE_VARIABLE)
+    if folder is not None and (_is_for_once(environment) or not _can_be_made(Path(folder))):
+        place = "neither beside the package nor in the home folder"
+        if not _is_for_once(environment):
+            place = f"not in {folder}"
+        raise BsmapError(
+            f"compiled code cannot be kept, {place}: set {CACHE_VARIABLE} to a folder that can "
+            "be written, on a disk with room"
+        )
+
+
+def _is_for_once(environment: Mapping[str, str]) -> bool:
+    return Path(environment.get(CACHE_VARIABLE, "")).name.startswith(FOR_ONCE)
 
 
 def _can_be_made(folder: Path) -> bool:

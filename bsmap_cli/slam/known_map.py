@@ -64,7 +64,8 @@ class KnownMap(Submap):
         unit = self.levels[-1].knot_step_m
         likelihood = self.likelihood(cell_m=unit, heights=HEIGHTS)
         every = max(1, math.ceil(len(points) / MOST_POINTS))
-        points, tangents = points[::every], tangents[::every]
+        # one layout for the compiler, whatever is left out
+        points, tangents = points[::every].copy(), tangents[::every].copy()
         reach_m = 0.5 * float((self._high - self._low).max()) + MARGIN_STEPS * unit
         window = Window(np.array([*(0.5 * (self._low + self._high)), 0.0]), reach_m, math.pi)
         peak = search(likelihood, points, tangents, window, floor=LEAST_SCORE)
