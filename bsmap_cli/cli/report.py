@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable
 from typing import Any
 
-from bsmap_cli.cli.talk import BOLD, Talk
+from bsmap_cli.cli.talk import BOLD, Talk, harmless
 from bsmap_cli.errors import UsageError
 
 
@@ -20,7 +20,7 @@ def print_json(document: Any) -> None:
 
 def print_rows(rows: Iterable[tuple[str, str]], talk: Talk) -> None:
     """`name   value` lines, the values in one column."""
-    rows = list(rows)
+    rows = [(harmless(name), harmless(value)) for name, value in rows]
     width = max((len(name) for name, _ in rows), default=0)
     for name, value in rows:
         print_text(f"{talk.paint(name.ljust(width), BOLD, sys.stdout)}  {value}".rstrip() + "\n")
@@ -28,7 +28,7 @@ def print_rows(rows: Iterable[tuple[str, str]], talk: Talk) -> None:
 
 def print_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]], talk: Talk) -> None:
     """A table with a header; columns as wide as their widest cell."""
-    lines = [header, *rows]
+    lines = [header, *(tuple(map(harmless, row)) for row in rows)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
     for number, line in enumerate(lines):
         text = "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))

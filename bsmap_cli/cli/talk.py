@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,20 +27,20 @@ class Talk:
     def note(self, text: str) -> None:
         """What was chosen for the user, and the last line of a run."""
         if self.level >= 0:
-            self._say(text)
+            self._say(harmless(text))
 
     def detail(self, text: str) -> None:
         """What only a curious user wants to know."""
         if self.level >= 1:
-            self._say(self.paint(text, DIM, sys.stderr))
+            self._say(self.paint(harmless(text), DIM, sys.stderr))
 
     def warn(self, text: str) -> None:
         """Something the user should look at; the run goes on. Said with --quiet, too."""
-        self._say(f"{self.paint('warning:', YELLOW, sys.stderr)} {text}")
+        self._say(f"{self.paint('warning:', YELLOW, sys.stderr)} {harmless(text)}")
 
     def error(self, text: str) -> None:
         """Why the run ends: what is wrong and what to do next."""
-        self._say(f"{self.paint('error:', RED, sys.stderr)} {text}")
+        self._say(f"{self.paint('error:', RED, sys.stderr)} {harmless(text)}")
 
     def paint(self, text: str, code: str, stream: TextIO) -> str:
         """The text in a color where the stream is a terminal that wants it."""
@@ -57,6 +58,14 @@ class Talk:
             return
         with suppress(OSError):  # nobody listens: no reason to stop the run
             print(text, file=sys.stderr, flush=True)
+
+
+def harmless(text: str) -> str:
+    """Text out of a file without what would steer a terminal."""
+    return _STEERING.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
+
+
+_STEERING = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def is_terminal(stream: TextIO | None) -> bool:

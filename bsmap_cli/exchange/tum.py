@@ -36,7 +36,8 @@ def read_tum(stream: Iterable[str]) -> Trajectory:
             stamp, (x, y, _, qx, qy, qz, qw) = parse_stamp(fields[0]), map(float, fields[1:])
         except ValueError as error:
             raise LogError(
-                f"line {number} of the trajectory is not `stamp x y z qx qy qz qw`: {error}"
+                f"line {number} of the trajectory is not `stamp x y z qx qy qz qw`:"
+                f" {str(error)[:120]}"
             ) from error
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):

@@ -19,7 +19,7 @@ from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
-from bsmap_cli.logs.text_log import TextScan, lines_of, stamp_ns_of
+from bsmap_cli.logs.text_log import TextScan, bad_line, lines_of, stamp_ns_of
 from bsmap_cli.logs.topics import choose_scan_topics
 
 FLASER, ROBOTLASER = b"FLASER", b"ROBOTLASER1"
@@ -111,7 +111,7 @@ class CarmenParser:
                 try:
                     yield parse(words)
                 except (ValueError, IndexError, BadMessageError) as error:
-                    yield BadMessageError(f"line {number} of {source.name}: {error}")
+                    yield bad_line(number, source, error)
 
     def _flaser(self, words: list[bytes], report: ReadReport) -> _Line:
         count = int(words[1])

@@ -18,7 +18,7 @@ from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
-from bsmap_cli.logs.text_log import TextScan, lines_of, stamp_ns_of
+from bsmap_cli.logs.text_log import TextScan, bad_line, lines_of, stamp_ns_of
 from bsmap_cli.sensor.scan import Ranges
 
 TOPIC = "csv"
@@ -66,7 +66,7 @@ class CsvParser:
                 try:
                     yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
                 except (ValueError, BadMessageError) as error:
-                    yield BadMessageError(f"line {number} of {source.name}: {error}")
+                    yield bad_line(number, source, error)
 
     def _header(self, names: list[str], source: str) -> _Header:
         columns = {name: index for index, name in enumerate(names)}

@@ -18,6 +18,7 @@ from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.stamps import parse_stamp
 
 LINE_LIMIT_BYTES = 1 << 24
+_LONGEST_FAULT = 120
 
 
 class TextScan(NamedTuple):
@@ -148,6 +149,14 @@ class TextLog(DrawnLog):
 
 
 _POSES = "poses in the log"
+
+
+def bad_line(number: int, source: Source, error: Exception) -> BadMessageError:
+    """What is wrong with a line, in few words however long the line is."""
+    what = str(error)
+    if len(what) > _LONGEST_FAULT:
+        what = what[:_LONGEST_FAULT] + " ..."
+    return BadMessageError(f"line {number} of {source.name}: {what}")
 
 
 def lines_of(source: Source, report: ReadReport) -> Iterator[tuple[int, bytes]]:

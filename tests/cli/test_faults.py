@@ -101,3 +101,16 @@ def test_a_damaged_map_is_refused_with_its_place(how, share, here):
     assert ran.returncode == 1
     assert message(ran).startswith("error: bad.bsm: ")
     assert "byte" in message(ran)
+
+
+def test_names_out_of_a_file_do_not_steer_the_terminal(tmp_path):
+    ros = Ros()
+    topic = "/scan\x1b[2J\x1b]0;title\x07"
+    messages = [(topic, SCAN, scan.stamp_ns, ros.scan(scan, frame="a\x1bb")) for scan in LOG]
+    (tmp_path / "log").write_bytes(ros_mcap(messages, ros))
+    for verb in ("info", "check"):
+        ran = bsmap(verb, "log", cwd=tmp_path)
+        assert ran.returncode == 0
+        said = ran.stdout + ran.stderr
+        assert b"\x1b" not in said and b"\x07" not in said
+        assert rb"\x1b" in said
