@@ -74,13 +74,24 @@ class LogFlags:
     sensor: SensorFlags
 
 
-def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
-    """Run `work` over the log, write what it made and report; the exit code."""
+def make_map(
+    work: Work,
+    log: LogFlags,
+    making: MakingFlags,
+    talk: Talk,
+    *,
+    old: MapDocument | None = None,
+) -> int:
+    """Run `work` over the log, write what it made and report; the exit code.
+
+    old : a map that is gone on with, whose knot step ends the ladder.
+    """
     from bsmap_cli.cli.progress import progress_bar
     from bsmap_cli.evaluation.map_statistics import map_statistics
     from bsmap_cli.logs.open_log import open_log
     from bsmap_cli.mapping.map_file import write_map
     from bsmap_cli.pipeline import full_report
+    from bsmap_cli.slam.known_map import settings_for_map
 
     began = perf_counter()
     if making.json and STDOUT in (making.output, making.traj):
@@ -89,6 +100,8 @@ def make_map(work: Work, log: LogFlags, making: MakingFlags, talk: Talk) -> int:
         map_out = outputs.add(making.output, binary=True)
         traj_out = outputs.add(making.traj) if making.traj is not None else None
         settings = log.settings.settings(log.sensor.overrides())
+        if old is not None:
+            settings = settings_for_map(settings, old)
         check_levels(making.levels, settings.ladder)
         if making.levels != "finest":
             every = replace(settings.final_map, all_levels=True)
@@ -131,7 +144,9 @@ def _final_document(
     """What is written: the wanted levels, the path unless --no-path, and which logs it is of."""
     chosen = with_levels(document, making.levels)
     path = chosen.path[:0] if making.no_path else chosen.path
-    return replace(chosen, path=path, meta={**chosen.meta, "logs": _describe(logs)})
+    before = chosen.meta.get("logs", [])  # of an old map that was gone on with
+    described = [*before, *_describe(logs)] if isinstance(before, list) else _describe(logs)
+    return replace(chosen, path=path, meta={**chosen.meta, "logs": described})
 
 
 def check_levels(wanted: str, ladder: tuple[float, ...]) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli import __version__
 from bsmap_cli.config import Settings, settings_as_dict
-from bsmap_cli.errors import LogError
+from bsmap_cli.errors import ConfigError, LogError
 from bsmap_cli.evaluation.pose_arrays import transform_poses
 from bsmap_cli.geometry.se2 import SE2, wrap_angle
 from bsmap_cli.logs.reader import LogReader
@@ -24,6 +24,7 @@ from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
 from bsmap_cli.sensor.pose_track import PoseTrack
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
+from bsmap_cli.slam.known_map import KnownMap, settings_for_map
 from bsmap_cli.slam.slam import Slam
 from bsmap_cli.slam.slam_settings import SlamSettings
 
@@ -97,25 +98,43 @@ def run_slam(
     settings: Settings,
     progress: Progress | None = None,
     onlooker: Onlooker | None = None,
+    *,
+    old: MapDocument | None = None,
 ) -> Run:
     """Sec. IV and beyond: a map and a trajectory from scans alone.
 
     onlooker : shown every scan and the result; it changes neither.
+    old : a map that the log goes on with; then map and trajectory are in its frame, and its knot
+    step ends the ladder.
 
     Raises
     ------
     LogError : the log holds no usable scan.
+    TrackingError : the log has no place in the old map, or more than one.
+    MapFileError : the old map draws nothing.
+    ConfigError : the settings keep the map as tracking built it, beside which no old one fits.
     """
     progress = progress or Silent()
     feed = Feed(reader, progress)
-    slam = Slam(_settings_for(SlamSettings, settings))
+    known = None
+    if old is not None:
+        if not settings.final_map.rebuild:
+            raise ConfigError(
+                "final_map.rebuild: false does not go with an old map: the old and the new part "
+                "become one when the map is built anew; leave it out, or set it to true"
+            )
+        settings = settings_for_map(settings, old)
+        known = KnownMap(old, _settings_for(SlamSettings, settings))
+    slam = Slam(_settings_for(SlamSettings, settings), known)
     for scan in feed:
         slam.process(scan)
         if onlooker is not None:
             onlooker.scan(scan, slam)
     progress.stage("closing loops and building the final map")
     result = slam.finish()
-    document, trajectory = _in_first_frame(result.document, result.trajectory)
+    document, trajectory = result.document, result.trajectory
+    if old is None:
+        document, trajectory = _in_first_frame(document, trajectory)
     if onlooker is not None:
         onlooker.finished(document, trajectory)
     seconds = dict(slam.seconds)
@@ -128,6 +147,7 @@ def run_slam(
         figures=result.figures,
         stage_seconds=seconds,
         losses=(f"tracking was lost and started again ({lost} times)",) if lost else (),
+        old=old,
     )
 
 
@@ -154,6 +174,7 @@ def _finished(
     figures: dict[str, Any],
     stage_seconds: dict[str, float],
     losses: tuple[str, ...],
+    old: MapDocument | None = None,
 ) -> Run:
     read = feed.reader.report
     steps_m = np.diff(trajectory.poses[:, :2], axis=0)
@@ -172,8 +193,12 @@ def _finished(
         "sensor": feed.sensor,
         **{key: figures[key] for key in ("scans", "scans_used", "travelled_m", "settings")},
     }
+    path = thinned_path(trajectory)
+    if old is not None:
+        path = np.concatenate((old.path, path))
+        meta["logs"] = old.meta.get("logs", [])
     return Run(
-        document=replace(document, meta=meta, path=thinned_path(trajectory)),
+        document=replace(document, meta=meta, path=path),
         trajectory=trajectory,
         figures=figures,
         stage_seconds={"read": feed.read_s, **stage_seconds},

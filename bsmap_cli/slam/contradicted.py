@@ -20,8 +20,13 @@ def remove_contradicted(
     poses: Points,
     settings: SlamSettings,
     sigma_m: float,
+    *,
+    old_curves: Sequence[int] | None = None,
 ) -> None:
-    """Weigh what all keyframes, at (n, 3) poses in the frame of the levels, hit and passed."""
+    """Weigh what all keyframes, at (n, 3) poses in the frame of the levels, hit and passed.
+
+    old_curves : in each level so many, the first ones, were there before the keyframes.
+    """
     if settings.visibility.method == "off":
         return
     views = [
@@ -29,10 +34,11 @@ def remove_contradicted(
         for keyframe, pose in zip(keyframes, poses, strict=True)
         if keyframe.sight is not None
     ]
-    for level in levels:
+    for level, old in zip(levels, old_curves or [0] * len(levels), strict=True):
         remove_unseen(
             level,
             views,
+            old_curves=old,
             sigma_m=sigma_m,
             settings=settings.visibility,
             min_length=settings.segmentation.min_length,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,9 @@ from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.thaw import thaw_level
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
 from bsmap_cli.slam.keyframes import Keyframe
@@ -48,9 +51,14 @@ def build_map(
     ladder: tuple[float, ...],
     settings: SlamSettings,
     sigma_m: float,
+    old: Sequence[MapLevel] = (),
 ) -> list[CurveMap]:
-    """Algorithm 1 over all keyframes; one map for each knot step of `ladder`."""
-    levels = [CurveMap(step, settings.degree) for step in ladder]
+    """Algorithm 1 over all keyframes; one map for each knot step of `ladder`.
+
+    old : the levels, as many, that the keyframes go on with; empty: they begin with nothing.
+    """
+    levels = [thaw_level(level) for level in old]
+    levels = levels or [CurveMap(step, settings.degree) for step in ladder]
     for pose, keyframe in zip(poses, keyframes, strict=True):
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
         clusters = coarser_levels(finest, ladder, settings.fitting, sigma_m)
@@ -88,16 +96,25 @@ def refine_poses(
 
 
 def final_map(
-    poses: Points, keyframes: list[Keyframe], settings: SlamSettings, sigma_m: float
+    poses: Points,
+    keyframes: list[Keyframe],
+    settings: SlamSettings,
+    sigma_m: float,
+    old: Sequence[MapLevel] = (),
 ) -> tuple[Points, list[CurveMap]]:
-    """Refined poses and the levels of the finished map."""
+    """Refined poses and the levels of the finished map.
+
+    old : a map that is gone on with, in the frame of the poses: a level for each knot step.
+    """
     ladder = settings.ladder[-settings.final_map.levels :]
     for _ in range(settings.final_map.rounds):
-        levels = build_map(poses, keyframes, ladder, settings, sigma_m)
+        levels = build_map(poses, keyframes, ladder, settings, sigma_m, old[-len(ladder) :])
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
-    levels = build_map(poses, keyframes, written, settings, sigma_m)
-    remove_contradicted(levels, keyframes, poses, settings, sigma_m)
+    before = old[-len(written) :]
+    levels = build_map(poses, keyframes, written, settings, sigma_m, before)
+    old_curves = [len(level) for level in before] or [0] * len(levels)
+    remove_contradicted(levels, keyframes, poses, settings, sigma_m, old_curves=old_curves)
     for level in levels:
         if len(keyframes) >= FEW_KEYFRAMES:
             drop_unconfirmed(level, settings.final_map.min_views)

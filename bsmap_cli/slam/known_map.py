@@ -30,16 +30,16 @@ LEAST_SCORE = 0.5  # of a place that may be right: much may have changed since
 class KnownMap(Submap):
     """The curves of a map in its own frame, one level for each knot step of the ladder.
 
-    Levels that the map does not hold are derived from its finest one.
+    Levels that the map does not hold are derived from its finest one. frozen : the levels as
+    they are; `levels` are matched against.
     """
 
     def __init__(self, document: MapDocument, settings: MappingSettings) -> None:
         super().__init__(0, SE2.identity(), settings)
-        self.finest = one_level(document)
-        self.levels = [
-            thaw_level(resampled_level(self.finest, step)) for step in settings.ladder[:-1]
-        ]
-        self.levels.append(thaw_level(self.finest))
+        finest = one_level(document)
+        self.frozen = [resampled_level(finest, step) for step in settings.ladder[:-1]]
+        self.frozen.append(finest)
+        self.levels = [thaw_level(level) for level in self.frozen]
         points, _ = sample_surfaces(self.levels[-1], self.levels[-1].knot_step_m)
         if not len(points):
             raise MapFileError("the map draws no curve: there is nothing to find a scan on")
@@ -61,6 +61,14 @@ class KnownMap(Submap):
         points, tangents : (n, 2) in the frame of the base. uniqueness : no other place may score
         more than the best divided by this. None where no place, or more than one, fits.
         """
+        found = self.places(points, tangents, worse=uniqueness)
+        return found[0] if len(found) == 1 else None
+
+    def places(self, points: Points, tangents: Points, *, worse: float) -> list[Peak]:
+        """The best place in the whole map, and its best rival elsewhere.
+
+        That is left out where its score is less than that of the best divided by `worse`.
+        """
         unit = self.levels[-1].knot_step_m
         likelihood = self.likelihood(cell_m=unit, heights=HEIGHTS)
         every = max(1, math.ceil(len(points) / MOST_POINTS))
@@ -70,17 +78,17 @@ class KnownMap(Submap):
         window = Window(np.array([*(0.5 * (self._low + self._high)), 0.0]), reach_m, math.pi)
         peak = search(likelihood, points, tangents, window, floor=LEAST_SCORE)
         if peak is None:
-            return None
+            return []
         rival = search(
             likelihood,
             points,
             tangents,
             window,
-            floor=peak.score / uniqueness,
+            floor=peak.score / worse,
             barred=peak,
             apart_m=10.0 * unit,
         )
-        return peak if rival is None else None
+        return [peak] if rival is None else [peak, rival]
 
 
 def settings_for_map(settings: Part, document: MapDocument) -> Part:

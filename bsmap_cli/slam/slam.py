@@ -21,8 +21,10 @@ from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.final_map import final_map
 from bsmap_cli.slam.full_graph import solve_full_graph
 from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.known_map import KnownMap
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
+from bsmap_cli.slam.old_map import OldMap
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.slam_view import SlamView, view_of
 from bsmap_cli.slam.submap_graph import SubmapGraph
@@ -54,10 +56,14 @@ class ScanLog:
 
 
 class Slam:
-    """Feed scans to `process`, in the order of the log; `finish` closes the map."""
+    """Feed scans to `process`, in the order of the log; `finish` closes the map.
 
-    def __init__(self, settings: SlamSettings) -> None:
+    known : a map to go on with, of the degree and the finest knot step of the settings.
+    """
+
+    def __init__(self, settings: SlamSettings, known: KnownMap | None = None) -> None:
         self.settings = settings
+        self._known = known
         self._log = ScanLog()
         self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
         self._local: LocalSlam | None = None
@@ -143,7 +149,12 @@ class Slam:
         return view_of(self._local, self._closer.graph.poses, pose_local)
 
     def finish(self) -> SlamResult:
-        """Solve for all poses, build the map once more with them, and give every scan its pose."""
+        """Solve for all poses, build the map once more with them, and give every scan its pose.
+
+        Raises
+        ------
+        TrackingError : there is a map to go on with, and the log has no place in it.
+        """
         local, closer, settings = self._local, self._closer, self.settings
         if local is None or closer is None:
             empty = Trajectory(np.zeros(0, np.int64), np.zeros((0, 3)))
@@ -151,11 +162,16 @@ class Slam:
                 MapDocument(degree=settings.degree, max_weight=1, levels=()), empty, {}
             )
         started = time.perf_counter()
-        poses, rejected = solve_full_graph(local, closer.loops)
+        known = self._known
+        if known:
+            poses, rejected = OldMap(known, local, closer.loops).solve()
+        else:
+            poses, rejected = solve_full_graph(local, closer.loops)
         solved = time.perf_counter()
         cap = settings.merging.max_weight
         if settings.final_map.rebuild:
-            poses, maps = final_map(poses, local.keyframes, settings, local.sigma_m)
+            old = known.frozen if known else ()
+            poses, maps = final_map(poses, local.keyframes, settings, local.sigma_m, old)
             levels = tuple(freeze_level(level, max_weight=cap) for level in maps)
         else:
             levels = tracked_levels(local.submaps, local.keyframes, poses, settings, local.sigma_m)
