@@ -27,7 +27,11 @@ NO_METADATA: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class Theme:
-    """Colours of a picture; `weights` names a colour map, of which the part `shades` is used."""
+    """Colours of a picture.
+
+    weights names a colour map, of which the part `shades` is used; of the colour map for errors
+    the part `errors` stands out from the ground.
+    """
 
     ground: str
     ink: str
@@ -36,6 +40,7 @@ class Theme:
     overlay: str
     weights: str
     shades: tuple[float, float]
+    errors: tuple[float, float]
     curves: tuple[str, ...]
 
 
@@ -47,6 +52,7 @@ LIGHT = Theme(
     overlay="#e07a1f",
     weights="YlGnBu",
     shades=(0.4, 1.0),
+    errors=(0.0, 0.85),
     curves=("#1f77b4", "#d95f02", "#1b9e77", "#7b3fa0", "#c2185b", "#8d6e2f", "#00838f", "#4b5563"),
 )
 DARK = Theme(
@@ -57,6 +63,7 @@ DARK = Theme(
     overlay="#ffab5e",
     weights="YlGnBu_r",
     shades=(0.3, 1.0),
+    errors=(0.3, 1.0),
     curves=("#6bb7ff", "#ffab5e", "#63d2a3", "#c9a0ff", "#ff8fb3", "#e3c878", "#5fd6e0", "#b7c2cd"),
 )
 
@@ -117,6 +124,21 @@ def draw_colour_bar(sheet: Sheet, mappable: ScalarMappable, label: str, *, left:
     bar.ax.set_title(label, color=sheet.theme.ink, fontsize=8, pad=3)
     for spine in bar.ax.spines.values():
         spine.set_visible(False)
+
+
+def draw_names(sheet: Sheet, *, centre: float) -> None:
+    """The lines of the footer that have a label, beside each other, `centre` of its width."""
+    handles, labels = sheet.footer.get_legend_handles_labels()
+    sheet.footer.legend(
+        handles,
+        labels,
+        loc="center",
+        bbox_to_anchor=(centre, 0.5),
+        ncols=len(labels),
+        frameon=False,
+        fontsize=8,
+        labelcolor=sheet.theme.ink,
+    )
 
 
 def save_figure(figure: Figure, stream: BinaryIO, format_: str) -> None:

@@ -20,10 +20,12 @@ from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.sampling import drawn_pieces, evaluate, sample_level
 from bsmap_cli.plotting.figures import (
+    WIDTH_INCH,
     Bounds,
     Sheet,
     Theme,
     draw_colour_bar,
+    draw_names,
     draw_scale_bar,
     map_sheet,
     theme_of,
@@ -33,6 +35,7 @@ from bsmap_cli.sensor.trajectory import Trajectory
 MARGIN = 0.04  # of the longer side
 WEIGHT_CLASSES = 8
 CURVE_WIDTH_PT, PATH_WIDTH_PT = 1.1, 0.6
+MARKS_PT = (0.8, 5.0)
 SAMPLES_PER_SPAN = 8
 MATCH_S = 0.1
 
@@ -43,6 +46,7 @@ def plot_map(
     trajectory: Trajectory | None = None,
     reference: Trajectory | None = None,
     overlay: MapDocument | None = None,
+    names: tuple[str, str] = ("map", "overlay"),
     level: float | None = None,
     clip: Bounds | None = None,
     colour_by: str = "weight",
@@ -54,7 +58,7 @@ def plot_map(
 
     trajectory : drawn over the map; the map's own thinned path where it is None.
     reference : drawn aligned to the trajectory, which is then coloured by its distance from it.
-    overlay : a second map in another colour; both are then drawn plain.
+    overlay : a second map in another colour; both are then drawn plain, and told apart by `names`.
     level : knot step [m] to draw; otherwise the finest, or all that are parts of one map.
     clip : show only this box x0, y0, x1, y1 [m].
     colour_by : "weight" (observations), "curve", or "level" (all levels).
@@ -66,22 +70,28 @@ def plot_map(
     every_level = colour_by == "level" and level is None
     levels = document.levels if every_level else document.chosen_levels(level)
     path = document.path[:, :2].astype(float) if trajectory is None else trajectory.poses[:, :2]
-    clouds = [sample_level(each, each.knot_step_m).points for each in levels]
+    below = overlay.chosen_levels(level) if overlay is not None else ()
+    clouds = [sample_level(each, each.knot_step_m).points for each in (*levels, *below)]
     sheet = map_sheet(clip or _bounds([*clouds, path]), theme)
     axes = sheet.axes
     if overlay is not None:
-        for each in overlay.chosen_levels(level):
+        for each in below:
             _add_lines(axes, _polylines(each), theme.overlay)
         for each in levels:
             _add_lines(axes, _polylines(each), theme.ink)
+        for name, colour in zip(names, (theme.ink, theme.overlay), strict=True):
+            sheet.footer.plot([], [], color=colour, lw=2.0, label=name)
+        draw_names(sheet, centre=0.75)
     else:
         _draw_levels(sheet, levels, colour_by, document.max_weight)
         _draw_legend(sheet, levels, colour_by, document.max_weight)
     for each in levels:
-        if control_points:
-            axes.plot(*each.control_points.T, ".", color=theme.path, ms=2.5, mew=0, zorder=3)
+        size = _mark_size(sheet, each)
         if knots:
-            axes.plot(*_knots(each).T, "x", color=theme.ink, ms=2.5, mew=0.4, zorder=3)
+            style: dict[str, Any] = {"ms": size, "mew": min(0.2 * size, 0.6), "zorder": 3}
+            axes.plot(*_knots(each).T, "x", color=theme.ink, **style)
+        if control_points:
+            axes.plot(*each.control_points.T, ".", color=theme.path, ms=size, mew=0, zorder=3)
     if trajectory is not None and reference is not None:
         _draw_compared(sheet, trajectory, reference)
     elif len(path):
@@ -156,8 +166,7 @@ def _draw_legend(sheet: Sheet, levels: Sequence[MapLevel], colour_by: str, max_w
         for number, level in enumerate(levels):
             label = f"{level.knot_step_m:g} m"
             sheet.footer.plot([], [], color=palette[number % len(palette)], lw=2.0, label=label)
-        style: dict[str, Any] = {"frameon": False, "fontsize": 8, "ncols": len(levels)}
-        sheet.footer.legend(loc="center right", labelcolor=sheet.theme.ink, **style)
+        draw_names(sheet, centre=0.75)
 
 
 def _weight_shades(theme: Theme) -> list[str]:
@@ -170,14 +179,27 @@ def _draw_compared(sheet: Sheet, trajectory: Trajectory, reference: Trajectory) 
     error = absolute_error(matched)
     truth = transform_poses(error.pose_reference_estimate.inverse(), reference.poses)[:, :2]
     style: dict[str, Any] = {"lw": PATH_WIDTH_PT, "ls": (0, (4, 2)), "zorder": 4}
-    sheet.axes.plot(*truth.T, color=sheet.theme.reference, **style)
+    for axes, points in ((sheet.axes, truth.T), (sheet.footer, ([], []))):
+        axes.plot(*points, color=sheet.theme.reference, label="reference", **style)
     ends = matched.estimate[:, :2]
     segments = np.stack((ends[:-1], ends[1:]), axis=1)
     norm = Normalize(0.0, max(float(error.translation_m.max()), 1e-6))
-    collection = LineCollection(list(segments), cmap="plasma", norm=norm, linewidths=1.2, zorder=5)
+    shades = colormaps["plasma"](np.linspace(*sheet.theme.errors, 256))
+    collection = LineCollection(
+        list(segments), cmap=ListedColormap(shades), norm=norm, linewidths=1.2, zorder=5
+    )
     collection.set_array(error.translation_m[1:])
     sheet.axes.add_collection(collection, autolim=False)
     draw_colour_bar(sheet, collection, "distance from reference [m]", left=0.55)
+    if sheet.footer.get_legend() is None:
+        draw_names(sheet, centre=0.42)
+
+
+def _mark_size(sheet: Sheet, level: MapLevel) -> float:
+    """Size of a mark [pt] that leaves room between the knots of a curve."""
+    shown_from_m, shown_to_m = sheet.axes.get_xlim()
+    step_pt = level.knot_step_m * 72.0 * WIDTH_INCH / (shown_to_m - shown_from_m)
+    return min(max(0.4 * step_pt, MARKS_PT[0]), MARKS_PT[1])
 
 
 def _knots(level: MapLevel) -> Points:

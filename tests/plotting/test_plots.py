@@ -78,7 +78,7 @@ def test_the_scale_bar_is_as_long_as_it_says():
 def test_control_points_and_knots_are_marked():
     document = room_document(with_path=False)
     figure = plot_map(document, control_points=True, knots=True)
-    marks = [line.get_xydata() for line in figure.axes[0].lines]
+    marks = [line.get_xydata() for line in figure.axes[0].lines][::-1]
     np.testing.assert_allclose(marks[0], document.finest.control_points)
     # a wall of 6 m at 0.1 m has 61 control points and 58 spans between 59 knots
     on_first_wall = marks[1][marks[1][:, 1] == 0.0]
@@ -108,6 +108,48 @@ def test_levels_and_overlay():
     assert len(plot_map(document, overlay=room_document()).axes[0].collections) == 2
     with pytest.raises(UsageError, match=r"no level of knot step 0.2 m: it has 0.4, 0.1"):
         plot_map(document, level=0.2)
+
+
+def test_the_second_map_is_in_the_picture_and_named():
+    far = make_level([line_points((20, 8), (24, 8), 0.1)], 0.1)
+    second = MapDocument(degree=3, max_weight=50, levels=(far,))
+    figure = plot_map(room_document(), overlay=second, names=("old.bsm", "new.bsm"))
+    axes, footer = figure.axes[:2]
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    assert x0 < 0.0 < 24.0 < x1
+    assert y0 < 0.0 < 8.0 < y1
+    assert [text.get_text() for text in footer.get_legend().texts] == ["old.bsm", "new.bsm"]
+    image = pixels(figure)
+    np.testing.assert_allclose(
+        pixel_of(figure, (22.0, 8.0), image), to_rgb(LIGHT.overlay), atol=0.05
+    )
+
+
+def test_a_clip_shows_that_box_alone():
+    axes = plot_map(room_document(), clip=(1.0, 0.5, 4.0, 2.5)).axes[0]
+    assert (*axes.get_xlim(), *axes.get_ylim()) == (1.0, 4.0, 0.5, 2.5)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_error_stands_out_from_the_ground(dark):
+    trajectory = path()
+    figure = plot_map(
+        room_document(), trajectory=trajectory, reference=trajectory, colour_by="curve", dark=dark
+    )
+    (error,) = [c for c in figure.axes[0].collections if c.get_array() is not None]
+    ground = np.array(to_rgb((DARK if dark else LIGHT).ground))
+    for share in np.linspace(0.0, 1.0, 20):
+        assert np.abs(np.array(error.cmap(share)[:3]) - ground).max() > 0.35
+    assert [text.get_text() for text in figure.axes[1].get_legend().texts] == ["reference"]
+
+
+def test_marks_leave_room_between_the_knots():
+    document = room_document(with_path=False)
+    for clip in (None, (0.0, 0.0, 1.0, 1.0), (-200.0, -200.0, 200.0, 200.0)):
+        figure = plot_map(document, control_points=True, clip=clip)
+        axes = figure.axes[0]
+        step = np.diff(axes.transData.transform([(0, 0), (0.1, 0)])[:, 0])[0] * 72 / figure.dpi
+        assert axes.lines[-1].get_markersize() <= max(0.5 * step, 1.0)
 
 
 def test_an_empty_map_is_a_picture_too():

@@ -12,6 +12,7 @@ from bsmap_cli.cli.options.common import (
     Strict,
     TalkFlags,
     TrajectoryOut,
+    box,
     numbers,
     option,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "Strict",
     "TalkFlags",
     "TrajectoryOut",
+    "box",
     "numbers",
     "option",
     "parse_laser_pose",

@@ -95,3 +95,13 @@ def numbers(name: str, text: str, count: int) -> list[float]:
         example = ",".join(["0.1", "30", "0", "1"][:count])
         raise UsageError(f"{name} {text}: give {count} numbers with commas, such as {example}")
     return values
+
+
+def box(text: str | None) -> tuple[float, float, float, float] | None:
+    """The box x0, y0, x1, y1 [m] of --clip; UsageError where it is none."""
+    if text is None:
+        return None
+    x0, y0, x1, y1 = numbers("--clip", text, 4)
+    if x0 >= x1 or y0 >= y1:
+        raise UsageError(f"--clip {text}: give the lower left corner, then the upper right one")
+    return x0, y0, x1, y1

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from bsmap_cli.cli.formats import MAP_FORMATS, MapFormat, chosen_format
 from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
-from bsmap_cli.cli.options import Force, MapIn, TalkFlags, numbers, option
+from bsmap_cli.cli.options import Force, MapIn, TalkFlags, box, numbers, option
 from bsmap_cli.cli.outputs import STDOUT, Output, Outputs
 from bsmap_cli.cli.replay import ReplayFlags
 from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from bsmap_cli.exchange.geodesy import GeoOrigin
-    from bsmap_cli.exchange.selection import Box, Selection
+    from bsmap_cli.exchange.selection import Selection
     from bsmap_cli.mapping.map_document import MapDocument
 
 # which formats an option means something to
@@ -153,16 +153,7 @@ def _selection(document: MapDocument, part: PartFlags) -> Selection:
     from bsmap_cli.exchange.selection import select
 
     trajectory = read_trajectory(part.traj) if part.traj is not None else None
-    return select(document, level=part.level, clip=_box(part.clip), trajectory=trajectory)
-
-
-def _box(text: str | None) -> Box | None:
-    if text is None:
-        return None
-    x0, y0, x1, y1 = numbers("--clip", text, 4)
-    if x0 >= x1 or y0 >= y1:
-        raise UsageError(f"--clip {text}: give the lower left corner, then the upper right one")
-    return x0, y0, x1, y1
+    return select(document, level=part.level, clip=box(part.clip), trajectory=trajectory)
 
 
 def _origin(text: str | None) -> GeoOrigin | None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 from bsmap_cli.cli.formats import PICTURE_FORMATS, chosen_format
 from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
-from bsmap_cli.cli.options import Force, MapIn, TalkFlags, option
+from bsmap_cli.cli.options import Force, MapIn, TalkFlags, box, option
 from bsmap_cli.cli.outputs import Outputs
 from bsmap_cli.errors import UsageError
 
@@ -20,10 +21,18 @@ class LookFlags:
         float | None,
         option("--level", metavar="STEP", help="Draw the level of this knot step [m]."),
     ] = None
+    clip: Annotated[
+        str | None,
+        option("--clip", metavar="X0,Y0,X1,Y1", help="Show only this box [m]."),
+    ] = None
     color_by: Annotated[
-        Literal["weight", "curve", "level"],
-        option("--color-by", metavar="weight|curve|level", help="What the color of a curve tells."),
-    ] = "weight"
+        Literal["weight", "curve", "level"] | None,
+        option(
+            "--color-by",
+            metavar="weight|curve|level",
+            help="What the color of a curve tells: its weight, by default.",
+        ),
+    ] = None
     dark: Annotated[bool, option("--dark", help="Light on dark.")] = False
     control_points: Annotated[bool, option("--control-points", help="Mark the control points.")] = (
         False
@@ -70,9 +79,13 @@ def run(
     Example:
       bsmap plot map.bsm --traj map.tum -o map.png
       bsmap plot map.bsm --traj map.tum --reference truth.tum -o error.svg
+      bsmap plot map.bsm --clip 0,0,4,3 --control-points --knots -o detail.pdf
     """
     if reference is not None and traj is None:
         raise UsageError("--reference compares with a path: give that with --traj")
+    if overlay is not None and look.color_by is not None:
+        raise UsageError("--color-by says nothing with --overlay: each map has one color then")
+    clip = box(look.clip)
     source = map_source(map_)
     inputs = [path for path in (source, traj, reference, overlay) if path is not None]
     with Outputs(force=force, inputs=inputs) as outputs:
@@ -87,10 +100,20 @@ def run(
             trajectory=read_trajectory(traj) if traj is not None else None,
             reference=read_trajectory(reference) if reference is not None else None,
             overlay=read_map_file(overlay)[0] if overlay is not None else None,
+            names=_names(source, overlay),
             level=look.level,
-            colour_by=look.color_by,
+            clip=clip,
+            colour_by=look.color_by or "weight",
             dark=look.dark,
             control_points=look.control_points,
             knots=look.knots,
         )
         save_figure(figure, target.open(), kind)
+
+
+def _names(*sources: str | None) -> tuple[str, str]:
+    """What the maps are called in the picture: as little as tells them apart."""
+    given = [source or "" for source in sources]
+    short = [Path(source).name for source in given]
+    first, second = short if short[0] != short[1] else given
+    return first, second
