@@ -11,31 +11,32 @@ compiled without counting (`inlined`, `lean`) and must not allocate.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
+# `_nrt=False` leaves numba's reference counting out: known to its compiler, not to its stubs
+_RULES = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
+
+
 def kernel(function: Function) -> Function:
     """Compile a function on plain arrays and numbers, when it is first called."""
-    return cast(Function, njit(cache=True, error_model="numpy", fastmath={"contract"})(function))
+    return _compile(function)
 
 
 def lean(function: Function) -> Function:
     """The same for a loop that allocates nothing: no references are counted in it."""
-    return cast(
-        Function,
-        njit(cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False)(function),
-    )
+    return _compile(function, _nrt=False)
 
 
 def inlined(function: Function) -> Function:
     """The same for what is done for one point, compiled into the loop that calls it."""
-    return cast(
-        Function,
-        njit(cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False, forceinline=True)(
-            function
-        ),
-    )
+    return _compile(function, _nrt=False, forceinline=True)
+
+
+def _compile(function: Function, **options: bool) -> Function:
+    rules: dict[str, Any] = {**_RULES, **options}
+    return cast(Function, njit(**rules)(function))

@@ -144,7 +144,7 @@ class LocalSlam:
 
     def fade(self, keyframe: Keyframe, sight: Sight) -> None:
         """Let the submaps that hold a keyframe lose what it looks through."""
-        for submap in self.submaps:
+        for submap in self.submaps[-3:]:  # two are filled; a third may just have begun
             if submap.keyframes[-1:] == [keyframe.index]:
                 submap.fade(sight, submap.to_submap(keyframe.pose_local), self.sigma_m)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import coarser_levels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
@@ -23,6 +23,7 @@ from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
+URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +67,9 @@ class LoopCloser:
     loops: list[Loop] = field(default_factory=list)
     tried: int = 0
     _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
-    _next_try: dict[int, float] = field(default_factory=dict)
+    _next_try: Vector = field(default_factory=lambda: np.empty(0))
+    _viewpoints: list[Points] = field(default_factory=list)
+    _extents_m: Vector = field(default_factory=lambda: np.empty(0))
     _travelled_m: float = 0.0
 
     def process(self, keyframe: Keyframe) -> None:
@@ -87,35 +90,42 @@ class LoopCloser:
 
     def _pose_map(self, keyframe: Keyframe) -> SE2:
         submap = self.local.submaps[keyframe.submap]
-        return self.graph.poses[submap.index] @ submap.to_submap(keyframe.pose_local)
+        return self.graph.pose(submap.index) @ submap.to_submap(keyframe.pose_local)
 
     def _candidates(self, keyframe: Keyframe) -> list[tuple[Submap, float, float]]:
         """Finished submaps that may see what the keyframe sees, nearest first."""
         unit, settings = self.local.settings.ladder[-1], self.local.settings.loops
-        old = [
-            submap
-            for submap in self.local.submaps[: max(0, keyframe.submap - 1)]
-            if submap.keyframes and self._next_try.get(submap.index, 0.0) <= self._travelled_m
-        ]
-        if not old:
+        count = max(0, keyframe.submap - 1)
+        if count == 0:
             return []
+        self._remember(count)
         metres, radians = self.graph.deviations_from(keyframe.submap)
         here = self._pose_map(keyframe)
         points = keyframe.clusters.points
         view_m = float(np.median(np.hypot(points[:, 0], points[:, 1]))) if len(points) else 0.0
+        reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
+        away = np.hypot(*(self.graph.poses[:count, :2] - (here.x, here.y)).T)
+        near = away <= self._extents_m[:count] + view_m + reach_m
+        near &= self._next_try[:count] <= self._travelled_m
         found = []
-        for submap in old:
-            reach_m = settings.deviations * float(metres[submap.index])
-            reach_rad = settings.deviations * float(radians[submap.index])
-            reach_m = min(reach_m, settings.max_reach * unit)
-            seen = self.graph.poses[submap.index].inverse() @ here
-            if math.hypot(seen.x, seen.y) > submap.extent_m + view_m + reach_m:
-                continue
-            distance = min(math.hypot(x - seen.x, y - seen.y) for x, y in submap.viewpoints[::4])
-            if distance < view_m + reach_m:
-                found.append((distance / (view_m + reach_m), submap, reach_m, reach_rad))
+        for index in np.flatnonzero(near).tolist():
+            submap = self.local.submaps[index]
+            seen = self.graph.pose(index).inverse() @ here
+            reach = float(reach_m[index])
+            away_m = np.hypot(*(self._viewpoints[index] - (seen.x, seen.y)).T)
+            distance = float(away_m.min())
+            if distance < view_m + reach:
+                turn = settings.deviations * float(radians[index])
+                found.append((distance / (view_m + reach), submap, reach, turn))
         found.sort(key=lambda entry: (entry[0], entry[1].index))
-        return [(submap, reach_m, reach_rad) for _, submap, reach_m, reach_rad in found]
+        return [(submap, reach, turn) for _, submap, reach, turn in found]
+
+    def _remember(self, count: int) -> None:
+        """Keep where finished submaps were seen from, and when each may be tried."""
+        for submap in self.local.submaps[len(self._extents_m) : count]:
+            self._extents_m = np.append(self._extents_m, submap.extent_m)
+            self._next_try = np.append(self._next_try, 0.0 if submap.keyframes else math.inf)
+            self._viewpoints.append(np.array(submap.viewpoints[::4]))
 
     def _try(
         self,
@@ -130,7 +140,7 @@ class LoopCloser:
         unit = settings.ladder[-1]
         self.tried += 1
         self._next_try[submap.index] = self._travelled_m + settings.loops.retry * unit
-        guess = (self.graph.poses[submap.index].inverse() @ self._pose_map(keyframe)).as_array()
+        guess = (self.graph.pose(submap.index).inverse() @ self._pose_map(keyframe)).as_array()
         far = reach_m > DIRECT_STEPS * unit
         if far:
             likelihood = submap.likelihood(cell_m=CELL_STEPS * unit, heights=HEIGHTS)
@@ -188,20 +198,20 @@ class LoopCloser:
         keyframe = self.local.keyframes[loop.keyframe]
         submap = self.local.submaps[keyframe.submap]
         pose_submap_submap = loop.pose_submap_base @ submap.to_submap(keyframe.pose_local).inverse()
-        expected = self.graph.poses[loop.submap].inverse() @ self.graph.poses[submap.index]
+        expected = self.graph.pose(loop.submap).inverse() @ self.graph.pose(submap.index)
         gap = expected.inverse() @ pose_submap_submap
         self.graph.add_loop(
             loop.submap,
             submap.index,
             pose_submap_submap,
             loop.information,
-            urgent=math.hypot(gap.x, gap.y) > self.local.settings.ladder[-1],
+            urgent=math.hypot(gap.x, gap.y) > URGENT_STEPS * self.local.settings.ladder[-1],
         )
 
     def _confirm(self, loop: Loop, keyframe: Keyframe) -> None:
         """Two closures agree when both ask for the same correction of the present place."""
         unit = self.local.settings.ladder[-1]
-        wanted = self.graph.poses[loop.submap] @ loop.pose_submap_base
+        wanted = self.graph.pose(loop.submap) @ loop.pose_submap_base
         for other, other_wanted in self._doubtful:
             if other.keyframe == loop.keyframe:
                 continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.submap import Submap
@@ -32,9 +32,9 @@ class SlamView:
         ]
 
 
-def view_of(local: LocalSlam, known: Sequence[SE2], pose_local: SE2) -> SlamView:
-    """The view of a run whose graph knows the poses of its first submaps, or of none."""
-    poses = list(known) or [local.submaps[0].pose_local]
+def view_of(local: LocalSlam, known: Points, pose_local: SE2) -> SlamView:
+    """The view of a run whose graph knows the (n, 3) poses of its first submaps, or of none."""
+    poses = [SE2.from_array(pose) for pose in known] or [local.submaps[0].pose_local]
     for k in range(len(poses), len(local.submaps)):
         poses.append(poses[-1] @ local.submaps[k - 1].to_submap(local.submaps[k].pose_local))
     pose_map_base = poses[local.finished] @ local.older.to_submap(pose_local)

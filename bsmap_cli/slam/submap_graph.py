@@ -11,77 +11,88 @@ from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.pose_graph import EdgeList, optimise
 from bsmap_cli.slam.uncertainty import isotropic_information, way_deviation
 
+GROWN = 1.05  # closures that move little are taken in when the graph has grown by so much
+STILL_STEPS = 0.02  # finest knot steps: a solution that still moves by less has converged
+
 
 class SubmapGraph:
     """Submaps linked one to the next by tracking, and across by loop closures.
 
-    poses : list of SE2, submap in the map frame, from the last optimisation on.
+    poses : (n, 3) of the submaps in the map frame, from the last optimisation on.
     """
 
     def __init__(self, local: LocalSlam) -> None:
         self._local = local
-        self.poses: list[SE2] = []
+        self.poses: Points = np.empty((0, 3))
         self._links: list[tuple[float, float]] = []
         self._loops = EdgeList()
-        self._stale = self._urgent = False
-        self._deviations: dict[int, tuple[Vector, Vector]] = {}
+        self._urgent = False
+        self._solved = 0
+        self._pending = 0
+        self._chains: tuple[Vector, Vector, int] | None = None
+
+    def pose(self, submap: int) -> SE2:
+        """Where a submap lies in the map frame."""
+        return SE2.from_array(self.poses[submap])
 
     def update(self) -> None:
         """Take in submaps begun since, and optimise anew where loops were added.
 
-        A closure that moves the map is taken in at once, others when the next submap begins.
+        A closure that moves the map is taken in at once, others when the graph has grown: what
+        they cost stays in proportion to what tracking costs.
         """
-        begun = len(self.poses) < len(self._local.submaps)
         submaps = self._local.submaps
-        while len(self.poses) < len(submaps):
-            k = len(self.poses)
+        begun = len(self.poses) < len(submaps)
+        poses = list(self.poses)
+        while len(poses) < len(submaps):
+            k = len(poses)
             if k == 0:
-                self.poses.append(submaps[0].pose_local)
+                poses.append(submaps[0].pose_local.as_array())
                 continue
             step = submaps[k - 1].to_submap(submaps[k].pose_local)
-            self.poses.append(self.poses[-1] @ step)
+            poses.append((SE2.from_array(poses[-1]) @ step).as_array())
             self._links.append(self._link_deviation(k))
+        self.poses = np.array(poses).reshape(-1, 3)
+        size = len(poses) + len(self._loops)
+        due = begun and self._pending and size >= GROWN * self._solved
         if begun or self._urgent:
-            self._deviations.clear()
-            if self._stale:
-                self._optimise(rounds=6 if self._urgent else 1)
-            self._stale = self._urgent = False
+            self._chains = None
+        if due or self._urgent:
+            self._optimise(rounds=6 if self._urgent else 1)
+            self._urgent, self._pending, self._solved = False, 0, size
 
     def add_loop(self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool) -> None:
         """A closure saw submap j from submap i."""
         self._loops.add(i, j, pose_i_j.as_array(), information, loop=True)
-        self._stale = True
+        self._pending += 1
         self._urgent = self._urgent or urgent
 
     def deviations_from(self, submap: int) -> tuple[Vector, Vector]:
         """Deviation [m] and [rad] of every submap relative to one, along the surest chain."""
-        if submap not in self._deviations:
-            self._deviations[submap] = self._surest_chains(submap)
-        return self._deviations[submap]
+        if self._chains is None or self._chains[2] != submap:
+            self._chains = (*self._surest_chains(submap), submap)
+        return self._chains[0], self._chains[1]
 
     def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
-        from scipy.sparse import coo_matrix
+        from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import dijkstra
 
         n = len(self.poses)
         match = way_deviation(0.0, self._local.settings.ladder[-1])
-        first = list(range(n - 1)) + self._loops.first
-        second = list(range(1, n)) + self._loops.second
-        metres = [link[0] for link in self._links] + [match[0]] * len(self._loops)
-        radians = [link[1] for link in self._links] + [match[1]] * len(self._loops)
-        graph = {}
-        for name, deviations in (("m", metres), ("rad", radians)):
-            lightest: dict[tuple[int, int], float] = {}
-            for i, j, value in zip(first, second, deviations, strict=True):
-                key = (min(i, j), max(i, j))
-                lightest[key] = min(value, lightest.get(key, math.inf))
-            pairs = np.array(list(lightest), np.int64).reshape(-1, 2)
-            values = np.array(list(lightest.values()), np.float64)
-            matrix = coo_matrix((values, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-            graph[name] = np.asarray(
-                dijkstra(matrix.tocsr(), directed=False, indices=np.array([submap]))
-            )[0]
-        return graph["m"], graph["rad"]
+        chain = np.arange(n - 1)
+        first = np.concatenate((chain, np.array(self._loops.first, np.int64)))
+        second = np.concatenate((chain + 1, np.array(self._loops.second, np.int64)))
+        links = np.array(self._links).reshape(-1, 2)
+        deviations = np.concatenate((links, np.tile(match, (len(self._loops), 1))))
+        pair = np.minimum(first, second) * n + np.maximum(first, second)
+        found = []
+        for values in deviations.T:
+            lightest = np.lexsort((values, pair))
+            kept = lightest[np.unique(pair[lightest], return_index=True)[1]]
+            matrix = csr_matrix((values[kept], np.divmod(pair[kept], n)), shape=(n, n))
+            chains = dijkstra(matrix, directed=False, indices=np.array([submap]))
+            found.append(np.asarray(chains)[0])
+        return found[0], found[1]
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
@@ -115,5 +126,5 @@ class SubmapGraph:
                 self._loops.information[e],
                 loop=True,
             )
-        poses = np.array([pose.as_array() for pose in self.poses])
-        self.poses = [SE2.from_array(pose) for pose in optimise(poses, edges, rounds=rounds).poses]
+        still = STILL_STEPS * self._local.settings.ladder[-1]
+        self.poses = optimise(self.poses, edges, rounds=rounds, tolerance_m=still).poses
