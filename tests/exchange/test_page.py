@@ -272,3 +272,55 @@ def test_an_empty_map_is_a_page_too(browser, tmp_path):
     browser.open((tmp_path / "page.html").as_uri())
     assert browser.complaints() == []
     assert browser.value("document.getElementById('player').hidden")
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390)])
+def test_a_phone_sees_the_map_and_opens_the_panel(browser, tmp_path, width, height):
+    (tmp_path / "page.html").write_bytes(page(room_document(), trajectory=walk()))
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 2, "mobile": True}
+    browser.call("Emulation.setDeviceMetricsOverride", **metrics)
+    try:
+        browser.open((tmp_path / "page.html").as_uri())
+        panel = "document.getElementById('panel')"
+        assert browser.value(f"{panel}.offsetHeight") == 0
+        for x, y in ((3.0, 0.0), (6.0, 2.0), (3.0, 4.0), (0.0, 2.0)):
+            px, py = place(browser, x, y)
+            shown = f"document.elementFromPoint({px}, {py}).id"
+            assert browser.value(shown) == "map", (x, y)
+        menu = browser.value(
+            "(() => { const b = document.getElementById('menu').getBoundingClientRect();"
+            " return [b.x + b.width / 2, b.y + b.height / 2, b.width, b.height]; })()"
+        )
+        assert min(menu[2:]) >= 44  # a finger's width
+        browser.click(*menu[:2])
+        assert browser.value(f"{panel}.offsetHeight") > 100
+        assert browser.value(f"{panel}.getBoundingClientRect().bottom") <= height
+        browser.click(*menu[:2])
+        assert browser.value(f"{panel}.offsetHeight") == 0
+        assert browser.complaints() == []
+    finally:
+        browser.call("Emulation.clearDeviceMetricsOverride")
+
+
+@needs_browser
+def test_100_000_control_points_are_drawn_and_moved(browser, tmp_path):
+    step = np.arange(100) * 0.1
+    curves = [
+        np.column_stack((12.0 * (k % 32) + step, 2.0 * (k // 32) + 0.2 * np.sin(step + k)))
+        for k in range(1000)
+    ]
+    document = MapDocument(degree=3, max_weight=50, levels=(make_level(curves),))
+    (tmp_path / "page.html").write_bytes(page(document))
+    browser.open((tmp_path / "page.html").as_uri())
+    for key in ("k", "n"):
+        browser.key(key)
+    before = browser.value("bsmap.frames.count")
+    for factor in (1.1, 1.1, 0.9, 0.9):
+        browser.value(f"bsmap.zoomAt(400, 300, {factor})")
+        browser.settle()
+    assert browser.value("bsmap.frames.count") >= before + 4
+    browser.mouse("mouseMoved", *place(browser, *curves[0][50]))
+    browser.settle()
+    assert browser.value("document.getElementById('tip').textContent").startswith("curve ")
+    assert browser.complaints() == []

@@ -72,9 +72,14 @@ function drawNormals(level, pieces) {
   context.stroke();
 }
 
+let taken = new Uint8Array(0); // where a mark of this frame stands: one more would not be seen
+
 function drawPoints(level, pieces, box) {
   const size = Math.min(2.2, Math.max(0.7, level.step * view.scale * 0.12));
   context.fillStyle = colours.path;
+  const wide = 2 * size, across = Math.ceil(view.width / wide) + 1;
+  const cells = across * (Math.ceil(view.height / wide) + 1);
+  if (taken.length < cells) taken = new Uint8Array(cells); else taken.fill(0, 0, cells);
   const done = new Set();
   for (const piece of pieces) {
     if (done.has(piece.curve)) continue;
@@ -82,7 +87,10 @@ function drawPoints(level, pieces, box) {
     for (let row = level.offsets[piece.curve]; row < level.offsets[piece.curve + 1]; row++) {
       const x = level.xy[2 * row], y = level.xy[2 * row + 1];
       if (x < box[0] || x > box[2] || y < box[1] || y > box[3]) continue;
-      context.fillRect(toX(x) - size, toY(y) - size, 2 * size, 2 * size);
+      const px = toX(x), py = toY(y), cell = Math.floor(py / wide) * across + Math.floor(px / wide);
+      if (taken[cell]) continue;
+      taken[cell] = 1;
+      context.fillRect(px - size, py - size, wide, wide);
     }
   }
 }

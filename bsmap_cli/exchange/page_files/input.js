@@ -56,6 +56,11 @@ canvas.addEventListener("wheel", (event) => {
   hover();
 }, { passive: false });
 
+$("menu").addEventListener("click", () => {
+  const open = $("panel").classList.toggle("open");
+  $("menu").setAttribute("aria-expanded", open);
+});
+
 const toggles = {}; // key -> function
 function addToggle(text, key, get, set) {
   const label = document.createElement("label"), box = document.createElement("input");
