@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
+from bsmap_cli.logs.check_reading import reading_findings
 from bsmap_cli.logs.check_scans import ScanStatistics
+from bsmap_cli.logs.finding import LEVELS, OFTEN_SHARE, Finding, counted, worse_if
 from bsmap_cli.logs.reader import LogReader, ReadReport
-
-Level = Literal["problem", "warning", "note"]
 
 GAP_S = 1.0
 """Longer than this without a scan is a gap, and longer than five usual intervals."""
 
-CLOCKS_APART_S = 1.0
+CLOCK_SET_S = 3600.0
+"""No robot pauses that long in one run: the clock was set."""
+
 FEW_RETURNS_SHARE = 0.5
 FOLLOWED_STEP_M, FOLLOWED_TURN_DEG = 0.4, 35.0
 """How far from the last pose tracking searches when it is lost; motion beyond needs odometry."""
-
-OFTEN_SHARE = 0.01
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """One thing that is wrong with a log, or worth to know.
-
-    name : "gaps", "stamps", ... for programs. level : "problem" where mapping will suffer,
-    "warning" where it may, "note" otherwise. remedy : what to do about it.
-    value : the measure behind it, in the unit that the message names.
-    """
-
-    name: str
-    level: Level
-    message: str
-    remedy: str
-    value: float
 
 
 def check_log(reader: LogReader) -> list[Finding]:
@@ -46,49 +28,8 @@ def check_log(reader: LogReader) -> list[Finding]:
     statistics = ScanStatistics(FOLLOWED_STEP_M, FOLLOWED_TURN_DEG)
     for scan in reader.scans():
         statistics.add(scan)
-    findings = [*_of_report(reader.report), *_of_scans(statistics, reader.report)]
-    order: tuple[Level, ...] = ("problem", "warning", "note")
-    return sorted(findings, key=lambda finding: order.index(finding.level))
-
-
-def _of_report(report: ReadReport) -> Iterator[Finding]:
-    if report.truncated:
-        yield Finding(
-            name="damage",
-            level="problem",
-            message="part of the log is missing or damaged",
-            remedy="copy it again, or map what is there: it is used up to the damage",
-            value=1.0,
-        )
-    if report.scans_skipped:
-        share = report.scans_skipped / (report.scans_skipped + report.scans_read)
-        yield Finding(
-            name="skipped",
-            level="problem" if share > OFTEN_SHARE else "warning",
-            message=f"{report.scans_skipped} scans cannot be read ({share:.1%})",
-            remedy="see the warnings for the first of them; mapping goes on without them",
-            value=float(report.scans_skipped),
-        )
-    if report.places_unknown:
-        yield Finding(
-            name="mounting",
-            level="warning",
-            message="the log does not tell where the laser sits on the base",
-            remedy="give --laser-pose x,y,yaw_deg, or record /tf_static",
-            value=1.0,
-        )
-    if report.recorded_after_s is not None:
-        worst_s = max(report.recorded_after_s, key=abs)
-        if abs(worst_s) > CLOCKS_APART_S:
-            yield Finding(
-                name="clocks",
-                level="warning",
-                message=f"stamps of scans and times of recording are up to {abs(worst_s):.1f} s"
-                " apart",
-                remedy="set the clocks of sensor and computer; if odometry has another clock than"
-                " the scans, give --odom none",
-                value=worst_s,
-            )
+    findings = [*reading_findings(reader.report), *_of_scans(statistics, reader.report)]
+    return sorted(findings, key=lambda finding: LEVELS.index(finding.level))
 
 
 def _of_scans(statistics: ScanStatistics, report: ReadReport) -> Iterator[Finding]:
@@ -100,14 +41,28 @@ def _of_scans(statistics: ScanStatistics, report: ReadReport) -> Iterator[Findin
 def _of_stamps(statistics: ScanStatistics, report: ReadReport) -> Iterator[Finding]:
     usual_s = statistics.usual_interval_s()
     limit_s = max(GAP_S, 5.0 * usual_s)
-    gaps = [(at_s, gap_s) for at_s, gap_s in statistics.longest_intervals() if gap_s > limit_s]
+    intervals = statistics.longest_intervals()
+    jumps = [(at_s, gap_s) for at_s, gap_s in intervals if gap_s > CLOCK_SET_S]
+    gaps = [(at_s, gap_s) for at_s, gap_s in intervals if limit_s < gap_s <= CLOCK_SET_S]
+    if statistics.farthest_back_s > CLOCK_SET_S or jumps:
+        at_s, ahead_s = max(jumps, key=lambda gap: gap[1], default=(0.0, 0.0))
+        back_s = statistics.farthest_back_s
+        how = f"back by {back_s:.0f} s" if back_s > ahead_s else f"ahead by {ahead_s:.0f} s"
+        yield Finding(
+            name="clock set",
+            level="warning",
+            message=f"the clock of the scans was set during the run: stamps jump {how}",
+            remedy="the map does not suffer, stamps of the trajectory jump too; odometry must have"
+            " the same clock, else give --odom none",
+            value=max(back_s, ahead_s),
+        )
     if gaps:
         at_s, longest_s = max(gaps, key=lambda gap: gap[1])
         has_odometry = report.odometry != "none"
         yield Finding(
             name="gaps",
-            level="warning" if has_odometry else "problem",
-            message=f"{len(gaps)} gaps between scans, the longest {longest_s:.1f} s at"
+            level=worse_if(not has_odometry),
+            message=f"{counted(len(gaps), 'gap')} between scans, the longest {longest_s:.1f} s at"
             f" {at_s:.1f} s (usual: {usual_s:.3f} s)",
             remedy="odometry bridges them"
             if has_odometry
@@ -118,18 +73,19 @@ def _of_stamps(statistics: ScanStatistics, report: ReadReport) -> Iterator[Findi
         yield Finding(
             name="stamps",
             level="warning",
-            message=f"{statistics.steps_back} stamps step back, by up to"
-            f" {statistics.farthest_back_s:.3f} s",
-            remedy="the order of the log is kept and speeds are not taken from such stamps; stamp"
-            " scans where they are measured",
+            message=f"{counted(statistics.steps_back, 'stamp')} earlier than the one before, by up"
+            f" to {statistics.farthest_back_s:.3f} s",
+            remedy="mapping keeps to the order of the log and takes no speeds from such stamps; to"
+            " mend the log, take stamps where the lidar is read",
             value=statistics.farthest_back_s,
         )
     if statistics.repeated:
         yield Finding(
             name="repeated stamps",
             level="warning",
-            message=f"{statistics.repeated} stamps repeat the one before",
-            remedy="look for a scan that was published twice",
+            message=f"{counted(statistics.repeated, 'stamp')} equal to the one before",
+            remedy="mapping keeps to the order of the log; look whether scans are published twice"
+            " or the clock is coarse",
             value=float(statistics.repeated),
         )
 
@@ -157,10 +113,24 @@ def _of_beams(statistics: ScanStatistics) -> Iterator[Finding]:
     if blind > 0.0:
         yield Finding(
             name="blind scans",
-            level="problem" if blind > OFTEN_SHARE else "warning",
-            message=f"{statistics.blind} scans have hardly a return ({blind:.1%})",
+            level=worse_if(blind > OFTEN_SHARE),
+            message=f"{counted(statistics.blind, 'scan')} with hardly a return ({blind:.1%})",
             remedy="odometry bridges a few; look for a covered lens or a robot lifted up",
             value=float(statistics.blind),
+        )
+    sectors = statistics.steady.sectors()
+    if sectors:
+        places = " and ".join(
+            f"{sector.from_deg} to {sector.to_deg} degrees ({sector.range_m:.2f} m)"
+            for sector in sectors
+        )
+        flags = " ".join(f"--ignore-angles {part.from_deg},{part.to_deg}" for part in sectors)
+        yield Finding(
+            name="robot in view",
+            level="warning",
+            message=f"beams always meet something near by: {places}",
+            remedy=f"if that is the robot itself, give {flags}",
+            value=float(len(sectors)),
         )
 
 
@@ -180,11 +150,14 @@ def _of_motion(statistics: ScanStatistics, report: ReadReport) -> Iterator[Findi
     how = "by the odometry" if report.odometry != "none" else "by the scans"
     yield Finding(
         name="steps",
-        level="problem" if often and report.odometry == "none" else "warning",
-        message=f"{far} steps from scan to scan are longer than {FOLLOWED_STEP_M} m or"
+        level=worse_if(often and report.odometry == "none"),
+        message=f"{counted(far, 'step')} from scan to scan longer than {FOLLOWED_STEP_M} m or"
         f" {FOLLOWED_TURN_DEG:.0f} degrees, {how}; the longest {statistics.longest_step_m:.2f} m,"
         f" {statistics.widest_turn_deg:.0f} degrees",
-        remedy="tracking follows them only by odometry: drive more slowly or record more scans a"
-        " second; read without --every",
+        remedy="tracking follows them by the odometry alone: drive more slowly or record more scans"
+        " a second"
+        if report.odometry != "none"
+        else "tracking may lose them: record odometry, drive more slowly or record more scans a"
+        " second",
         value=float(far),
     )

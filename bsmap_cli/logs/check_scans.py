@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.messages import SECOND_NS
+from bsmap_cli.logs.steady_beams import SteadyBeams
 from bsmap_cli.sensor.scan import Scan
 
 _KEPT_INTERVALS = 1000
@@ -41,6 +42,7 @@ class ScanStatistics:
         self.farthest_back_s = 0.0
         self.repeated = 0
         self.blind = 0
+        self.steady = SteadyBeams()
         self.longest_step_m = 0.0
         self.widest_turn_deg = 0.0
         self._first_ns: int | None = None
@@ -56,6 +58,7 @@ class ScanStatistics:
             self._first_ns = scan.stamp_ns
         self.beam_counts.add(len(scan.ranges_m))
         ranges = _valid_ranges(scan)
+        self.steady.add(scan, ranges)
         invalid = float(np.isnan(ranges).mean())
         self._invalid += invalid
         self.blind += invalid > 1.0 - _BLIND_SHARE

@@ -62,7 +62,7 @@ class MessageLog(DrawnLog):
         topics = preview.scan_topics(report)
         motion = preview.motion(topics, report)
         mountings = Mountings(preview.tree, preview.base_frame(motion), self._options, report)
-        frozen = preview.frozen_topics(topics)
+        frozen = frozenset(topic for topic in topics if preview.is_frozen(topic))
         self._keep_only(frozenset((*topics, motion.topic)))
         return ScanStream(
             topics=topics,

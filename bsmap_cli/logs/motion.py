@@ -55,6 +55,7 @@ class OdometryTopic:
 
     base_frame : where the user names another frame than the messages do, its fixed place on
     theirs is looked up in `tree`.
+    frozen : the stamps stand still; the times of recording are taken, as for stamps of zero.
     """
 
     def __init__(
@@ -64,8 +65,10 @@ class OdometryTopic:
         base_frame: str | None,
         tree: TransformTree,
         report: ReadReport,
+        frozen: bool = False,
     ) -> None:
         self.name = topic
+        self._frozen = frozen
         self.topic: str | None = topic
         self.buffer: OdometryBuffer | None = OdometryBuffer()
         self.base_frame = base_frame or child_frame or None
@@ -93,7 +96,8 @@ class OdometryTopic:
         x_m, y_m, yaw_rad = record.x_m, record.y_m, record.yaw_rad
         if self._pose_child_base is not None:
             x_m, y_m, yaw_rad = (SE2(x_m, y_m, yaw_rad) @ self._pose_child_base).as_array().tolist()
-        self.buffer.push(record.stamp_ns or log_time_ns, x_m, y_m, yaw_rad)
+        stamp_ns = 0 if self._frozen else record.stamp_ns
+        self.buffer.push(stamp_ns or log_time_ns, x_m, y_m, yaw_rad)
 
     def take_transforms(self, log_time_ns: int, records: list[TransformRecord]) -> None:
         """Nothing to do."""

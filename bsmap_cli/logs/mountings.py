@@ -46,8 +46,10 @@ class Mountings:
         outer = self._outer(frame, is_posed=inner is not None and not _is_identity(inner))
         mounting = mounting_of(outer if inner is None else outer @ inner)
         if mounting.is_tilted:
+            tilt_deg = math.degrees(mounting.tilt_rad)
+            self._report.tilt_deg = max(self._report.tilt_deg, tilt_deg)
             self._report.warn(
-                f"{frame} is tilted by {math.degrees(mounting.tilt_rad):.0f} degrees: its scans"
+                f"{frame} is tilted by {tilt_deg:.0f} degrees: its scans"
                 " are taken as if they were level"
             )
         return mounting
@@ -63,6 +65,7 @@ class Mountings:
                 self._report.warn(_taken_as_base(frame, base))
             return np.eye(4)
         if self._tree.moves(base, frame):
+            self._report.places_move = True
             self._report.warn(f"{frame} moves on {base}: its first place is used for the whole log")
         return matrix
 
@@ -73,8 +76,8 @@ def _is_identity(matrix: Matrix) -> bool:
 
 def _taken_as_base(frame: str, base: str | None) -> str:
     missing = f" from {base}" if base else ""
-    laser = f" {frame}" if frame else ""
+    laser = f"'{frame}', the frame of the scans," if frame else "the laser"
     return (
-        f"no transform{missing} to the laser{laser} in the log: the laser is taken to be the base"
+        f"no transform{missing} to {laser} in the log: the laser is taken to be the base"
         " (tell its place with --laser-pose x,y,yaw_deg)"
     )

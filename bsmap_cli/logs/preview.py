@@ -11,6 +11,7 @@ from bsmap_cli.logs.messages import (
     SECOND_NS,
     BadMessageError,
     Channel,
+    CloudRecord,
     LaserRecord,
     OdometryRecord,
     Record,
@@ -23,7 +24,7 @@ from bsmap_cli.logs.transforms import TransformTree, is_odom
 PREVIEW_NS = 2 * SECOND_NS
 _PREVIEW_SCANS = 1000
 _PREVIEW_MESSAGES = 50_000
-_CONSTANT_SCANS = 5
+_CONSTANT_STAMPS = 5
 
 
 class Event(NamedTuple):
@@ -107,19 +108,16 @@ class Preview:
         """The base, where the user or the motion names it."""
         return (self.options.base_frame or "").removeprefix("/") or motion.base_frame
 
-    def frozen_topics(self, scan_topics: tuple[str, ...]) -> frozenset[str]:
-        """Scan topics whose stamps stand still while the times of recording do not."""
-        frozen = set()
-        for topic in scan_topics:
-            pairs = [
-                (event.record.stamp_ns, event.log_time_ns)
-                for event in self.events
-                if event.channel.topic == topic and isinstance(event.record, LaserRecord)
-            ]
-            stamps, times = {stamp for stamp, _ in pairs}, {time for _, time in pairs}
-            if len(pairs) >= _CONSTANT_SCANS and len(stamps) == 1 and len(times) > 1:
-                frozen.add(topic)
-        return frozenset(frozen)
+    def is_frozen(self, topic: str) -> bool:
+        """Whether the stamps of a topic stand still while the times of recording do not."""
+        pairs = [
+            (event.record.stamp_ns, event.log_time_ns)
+            for event in self.events
+            if event.channel.topic == topic
+            and isinstance(event.record, LaserRecord | CloudRecord | OdometryRecord)
+        ]
+        stamps, times = {stamp for stamp, _ in pairs}, {time for _, time in pairs}
+        return len(pairs) >= _CONSTANT_STAMPS and len(stamps) == 1 and len(times) > 1
 
     def _channels(self) -> list[Channel]:
         return list(self.seen.values()) if self.indexed is None else self.indexed
@@ -143,7 +141,7 @@ class Preview:
         record = self.first_record(topic)
         child = record.child_frame if isinstance(record, OdometryRecord) else None
         base = (self.options.base_frame or "").removeprefix("/") or None
-        return OdometryTopic(topic, child, base, self.tree, report)
+        return OdometryTopic(topic, child, base, self.tree, report, self.is_frozen(topic))
 
     def _transform_motion(self, scan_topics: tuple[str, ...]) -> Motion | None:
         records = [self.first_record(topic) for topic in scan_topics]

@@ -47,6 +47,9 @@ class ReadReport:
     truncated : part of the log is missing or damaged.
     odometry : what moves the base, in a few words.
     places_unknown : whether the place of a laser was neither in the log nor told.
+    places_move : whether a laser was seen to move on its base.
+    tilt_deg : of the most tilted laser, 0 where all are level enough.
+    stamps_replaced : topics some of whose stamps are not believed.
     recorded_after_s : least and greatest time of recording minus stamp [s], where the log has
         both.
     warnings : one line each, for the user, without repetition.
@@ -58,6 +61,9 @@ class ReadReport:
     truncated: bool = False
     odometry: str = "none"
     places_unknown: bool = False
+    places_move: bool = False
+    tilt_deg: float = 0.0
+    stamps_replaced: list[str] = field(default_factory=list)
     recorded_after_s: tuple[float, float] | None = None
     warnings: list[str] = field(default_factory=list)
 

@@ -102,6 +102,8 @@ class ScanStream:
             return True
         if topic in self._frozen or (stamp_ns == 0 and log_time_ns != 0):
             how = "are zero" if stamp_ns == 0 else "stand still"
+            if topic not in self._report.stamps_replaced:
+                self._report.stamps_replaced.append(topic)
             self._report.warn(f"stamps of {topic} {how}: the time of recording is used")
             stamp_ns = log_time_ns
         else:

@@ -15,6 +15,7 @@ from bsmap_cli.sensor.scan import Scan
 from tests.logs.making import (
     SCAN,
     SECOND_NS,
+    TF,
     Ros,
     csv,
     float32,
@@ -124,6 +125,67 @@ def test_mounting_clocks_skipped_and_damage(tmp_path):
     assert found["skipped"].value == 1
     assert all(finding.remedy for finding in found.values())
     assert findings(tmp_path, data=data[: len(data) // 2])["damage"].level == "problem"
+
+
+def test_a_clock_that_was_set(tmp_path):
+    for jump_s, way in ((-1_000_000_000, "back by 1000000000 s"), (86_400, "ahead by 86400 s")):
+        scans = [
+            dataclasses.replace(s, stamp_ns=s.stamp_ns + (jump_s * SECOND_NS if i > 90 else 0))
+            for i, s in enumerate(a_drive())
+        ]
+        found = findings(tmp_path, scans)
+        assert way in found["clock set"].message
+        assert "gaps" not in found
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 5 * SECOND_NS])
+def test_stamps_that_are_none(tmp_path, stamp_ns):
+    log = [
+        (topic, kind, at_ns, ROS.scan(scan, stamp_ns=stamp_ns) if topic == "/scan" else message)
+        for scan in a_drive()
+        for topic, kind, at_ns, message in list(messages_of([scan], ROS))[1:]
+    ]
+    found = findings(tmp_path, data=ros_mcap(log, ROS))["no stamps"]
+    assert "/scan" in found.message
+
+
+@pytest.mark.parametrize("fault", ["tilt", "moving laser"])
+def test_lasers_that_do_not_sweep_the_plane(tmp_path, fault):
+    scans = a_drive(30)
+    at_ns = scans[0].stamp_ns
+    angles = [math.radians(20.0)] if fault == "tilt" else [0.0, math.radians(5.0)]
+    mountings = [
+        ROS.transforms(
+            (at_ns, "base_link", "laser", (0.1, 0, 0.2), (0, math.sin(a / 2), 0, math.cos(a / 2)))
+        )
+        for a in angles
+    ]
+    log = [("/tf", TF, at_ns, mounting) for mounting in mountings]
+    log += [message for message in messages_of(scans, ROS) if message[0] != "/tf_static"]
+    found = findings(tmp_path, data=ros_mcap(log, ROS))
+    assert set(found) == {fault}
+    assert found[fault].level == "problem"
+
+
+def test_the_robot_in_its_own_view(tmp_path):
+    scans = a_drive(turn=0.1)
+    assert findings(tmp_path, scans) == {}
+    posts = {20: (0.3, range(18, 23)), 200: (0.45, range(199, 202))}
+    seen = []
+    for index, scan in enumerate(scans):
+        ranges = scan.ranges_m.copy()
+        for range_m, beams in posts.values():
+            ranges[list(beams)] = range_m + 0.01 * (index % 3)
+        seen.append(dataclasses.replace(scan, ranges_m=ranges))
+    found = findings(tmp_path, seen)["robot in view"]
+    for beam, (range_m, beams) in posts.items():
+        low, high = (math.degrees(LOW + STEP * edge) for edge in (beams[0] - 0.5, beams[-1] + 0.5))
+        flag = f"--ignore-angles {math.floor(low)},{math.ceil(high)}"
+        assert flag in found.remedy, beam
+        assert f"{range_m:.2f} m" in found.message
+    assert "robot in view" not in findings(tmp_path, seen[:40])
+    still = [dataclasses.replace(seen[0], stamp_ns=scan.stamp_ns) for scan in seen]
+    assert "robot in view" not in findings(tmp_path, still)
 
 
 def test_the_gravest_comes_first(tmp_path):

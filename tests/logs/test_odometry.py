@@ -231,6 +231,16 @@ def test_stamps_that_stand_still_take_the_time_of_recording(tmp_path):
     assert any("stand still" in warning for warning in report.warnings)
 
 
+def test_odometry_whose_stamps_stand_still_takes_the_time_of_recording(tmp_path):
+    messages = []
+    for i in range(9):
+        at_ns = T0 + i * 100 * MS
+        messages += [odom_at(7, at_ns, pose=SE2(float(i), 0.0, 0.0)), scan_at(7, at_ns)]
+    found, report = drive(tmp_path, messages)
+    assert [scan.pose_odom_base.x for scan in found] == list(range(9))
+    assert report.stamps_replaced == ["/scan"]
+
+
 def test_a_base_frame_that_is_not_there(tmp_path):
     messages = [odom_at(T0), scan_at(T0)]
     with pytest.raises(BsmapError, match="--base-frame"):
