@@ -49,7 +49,7 @@ def write_svg(stream: BinaryIO, selection: Selection) -> None:
         *(f".weight-{k + 1} {{ stroke: {SHADES[k]} }}" for k in range(WEIGHT_CLASSES)),
         f"#path {{ stroke: {PATH_COLOUR}; stroke-width: {STROKE * side / 2:.4g} }}",
         "</style>",
-        '<g id="map" transform="scale(1 -1)">',
+        '<g id="map" transform="scale(1 -1)" fill="none">',  # for programs that read no styles
     ]
     several = len(selection.levels) > 1
     for selected, level_beziers in zip(selection.levels, beziers, strict=True):

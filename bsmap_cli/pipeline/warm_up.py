@@ -67,6 +67,7 @@ def _rehearsals() -> Iterator[Callable[[], object]]:
     yield lambda: run_map(_Rehearsed(made), "odom", paper)
     known: MapDocument = run_map(_Rehearsed(made), made.truth, default).document
     yield lambda: run_localize(_Rehearsed(made), known, default)
+    yield lambda: run_slam(_Rehearsed(made), default, old=known)
 
 
 class _Rehearsed:

@@ -55,6 +55,9 @@ def place(here):
         truth = read_tum(lines)
     shutil.copy(here / "map.tum", here / "intel.tum")
     first, second = (format_stamp(int(stamp)) for stamp in truth.stamps_ns[:2])
+    shutil.copy(here / "map.bsm", here / "old.bsm")
+    for name in ("intel.clf.gz", "mit-csail.clf.gz"):
+        shutil.copy(here / "run.mcap", here / name)  # the content says what a log is
     (here / "intel.relations").write_text(f"{first} {second} 0 0 0 0 0 0.1\n")
     assert bsmap("config", "init", "robot.yaml", cwd=here).returncode == 0
     return here

@@ -41,6 +41,7 @@ def test_the_format_is_that_of_the_name(kind, here):
         (["--reference", "truth.tum"], "--traj"),
         (["--overlay", "map.bsm", "--color-by", "curve"], "--color-by says nothing"),
         (["--clip", "1,2,0,3"], "lower left"),
+        (["--format", "svg", "--width", "700"], "--width says nothing to svg"),
         (["--color-by", "age"], "--color-by"),
         (["--level", "0.7"], "knot step"),
     ],

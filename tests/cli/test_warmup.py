@@ -52,6 +52,7 @@ RUNS = {
     "slam-paper": ["slam", "run.mcap", "-o", "x.bsm", "--profile", "paper"],
     "slam-tracked": ["slam", "run.mcap", "-o", "x.bsm", "--set", "final_map.rebuild=false"],
     "slam-degree": ["slam", "run.mcap", "-o", "x.bsm", "--set", "degree=5"],
+    "slam-on": ["slam", "run.mcap", "-o", "x.bsm", "--map", "map.bsm"],
     "map": ["map", SAMPLES / "wall.mcap", "--poses", SAMPLES / "wall.truth.tum", "-o", "x.bsm"],
     "map-paper": ["map", "run.mcap", "--poses", "odom", "-o", "x.bsm", "--profile", "paper"],
     "localize": ["localize", "run.mcap", "--map", "map.bsm", "--traj", "x.tum"],

@@ -48,6 +48,15 @@ def test_the_same_map_gives_the_same_bytes(format_, colour_by):
     assert b"Date" not in first
 
 
+def test_a_picture_is_as_wide_as_asked_for():
+    figure = plot_map(room_document())
+    stream = io.BytesIO()
+    save_figure(figure, stream, "png", width_px=700)
+    image = Image.open(stream)
+    assert (image.width, image.mode) == (700, "P")
+    assert Image.open(io.BytesIO(saved(plot_map(room_document()), "png"))).width == 2000
+
+
 def test_walls_are_where_they_are_and_ground_elsewhere():
     for dark, theme in ((False, LIGHT), (True, DARK)):
         figure = plot_map(room_document(with_path=False), dark=dark)

@@ -33,6 +33,10 @@ class LookFlags:
             help="What the color of a curve tells: its weight, by default.",
         ),
     ] = None
+    width: Annotated[
+        int | None,
+        option("--width", metavar="PX", min=100, max=20000, help="Of a .png: 2000 pixels."),
+    ] = None
     dark: Annotated[bool, option("--dark", help="Light on dark.")] = False
     control_points: Annotated[bool, option("--control-points", help="Mark the control points.")] = (
         False
@@ -90,6 +94,8 @@ def run(
     inputs = [path for path in (source, traj, reference, overlay) if path is not None]
     with Outputs(force=force, inputs=inputs) as outputs:
         kind = chosen_format(output, format_, PICTURE_FORMATS)
+        if look.width is not None and kind != "png":
+            raise UsageError(f"--width says nothing to {kind}, which has no pixels: leave it out")
         target = outputs.add(output, binary=kind != "svg")
         document, _ = read_map_file(source)
 
@@ -108,7 +114,7 @@ def run(
             control_points=look.control_points,
             knots=look.knots,
         )
-        save_figure(figure, target.open(), kind)
+        save_figure(figure, target.open(), kind, width_px=look.width)
 
 
 def _names(*sources: str | None) -> tuple[str, str]:

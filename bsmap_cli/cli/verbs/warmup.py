@@ -20,7 +20,7 @@ def run(*, talk: TalkFlags, json: Json = False) -> None:
     \b
     Example:
       bsmap warmup
-      NUMBA_CACHE_DIR=/opt/bsmap-cache bsmap warmup --json
+      bsmap warmup --json
     """
     began = perf_counter()
     check_kept()

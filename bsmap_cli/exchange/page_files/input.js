@@ -97,7 +97,7 @@ const addShown = (text, key, name) => addToggle(text, key, () => shown[name], (o
 if (path) addShown("path", "p", "path");
 if (scans) addShown("scan", "s", "scan");
 addShown("control points", "k", "points");
-addShown("free side", "n", "normals");
+addShown("normals, free side", "n", "normals");
 $("panel").append(document.createElement("hr"));
 addButton("measure", "m", "measure", () => measure(!ruler.on));
 addButton("copy place", "c", "copy", copyPlace);
