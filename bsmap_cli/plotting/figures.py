@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from io import BytesIO
 from typing import Any, BinaryIO
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -163,9 +163,8 @@ def _write_png(figure: Figure, stream: BinaryIO, width_px: int | None) -> None:
 
     if width_px is not None:
         figure.set_dpi(width_px / figure.get_figwidth())
-    drawn = BytesIO()
-    figure.savefig(drawn, format="rgba", dpi="figure", facecolor=figure.get_facecolor())
-    size = figure.canvas.get_width_height()
-    image = Image.frombytes("RGBA", size, drawn.getvalue()).convert("RGB")
+    canvas: Any = FigureCanvasAgg(figure)  # its methods are not typed
+    canvas.draw()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     few = image.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     few.save(stream, "png", optimize=True)

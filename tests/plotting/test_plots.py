@@ -31,6 +31,12 @@ def pixel_of(figure, point, image):
     return image[round(image.shape[0] - row), round(column)]
 
 
+def darkest_at(figure, point, image):
+    column, row = figure.axes[0].transData.transform(point)
+    top, left = round(image.shape[0] - row), round(column)
+    return image[top - 1 : top + 2, left - 1 : left + 2].min()
+
+
 def path():
     t = np.linspace(0.0, 4.0, 50)
     poses = np.column_stack((1.0 + t, 1.0 + 0.5 * np.sin(t), 0.1 * t))
@@ -48,13 +54,20 @@ def test_the_same_map_gives_the_same_bytes(format_, colour_by):
     assert b"Date" not in first
 
 
-def test_a_picture_is_as_wide_as_asked_for():
-    figure = plot_map(room_document())
+@pytest.mark.parametrize("width", [None, 333, 700, 1400, 1401])
+@pytest.mark.parametrize("clip", [None, (-0.5, -0.7, 6.31, 4.77)])
+def test_a_picture_is_as_wide_as_asked_for(width, clip):
+    figure = plot_map(room_document(with_path=False), clip=clip)
     stream = io.BytesIO()
-    save_figure(figure, stream, "png", width_px=700)
-    image = Image.open(stream)
-    assert (image.width, image.mode) == (700, "P")
-    assert Image.open(io.BytesIO(saved(plot_map(room_document()), "png"))).width == 2000
+    save_figure(figure, stream, "png", width_px=width)
+    picture = Image.open(stream)
+    assert abs(picture.width - (width or 2000)) <= 1
+    assert picture.mode == "P"
+    image = np.asarray(picture.convert("RGB")) / 255.0
+    for point in ((3.0, 0.0), (6.0, 2.0), (3.0, 4.0), (0.0, 2.0), (3.5, 2.0)):
+        assert darkest_at(figure, point, image) < 0.9, point
+    for point in ((1.0, 1.0), (4.0, 2.0), (3.0, 3.8)):
+        assert darkest_at(figure, point, image) > 0.98, point
 
 
 def test_walls_are_where_they_are_and_ground_elsewhere():
