@@ -105,6 +105,7 @@ class Localizer:
             self._pose,
             prediction,
             blind=stretch if scan.pose_odom_base is None else 1.0,
+            growing=False,
             sigma_m=self._front.sigma_m,
             settings=self._wary(),
         )

@@ -26,13 +26,15 @@ def match_scan(
     prediction: Prediction,
     *,
     blind: float,
+    growing: bool = True,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
     """Register the scan that follows the one at `last`, a pose in the submap's frame.
 
     blind : usual scan times that passed without odometry; in a gap the robot may have gone
-    anywhere near, and even a fair match may be of another place.
+    anywhere near, and even a fair match may be of another place. growing : the map ends where the
+    robot has been, and not where the walls do.
     """
     predicted = (last @ prediction.step).as_array()
     information = prediction.information()
@@ -62,6 +64,7 @@ def match_scan(
         information,
         reach_rad=math.radians(min(180.0, recovery.reach_deg * wider)),
         sigma_m=sigma_m,
+        odometry=predicted if growing and prediction.by_odometry else None,
         recovery=recovery,
         registration=settings.registration,
     )

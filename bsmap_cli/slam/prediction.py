@@ -45,13 +45,15 @@ class Prediction:
     """`step` is the motion in the body frame since the last scan.
 
     sigma_m, sigma_rad : how far the true step may be off. drift_m : what a step adds to the error
-    of the way where nothing but this prediction is known.
+    of the way where nothing but this prediction is known. by_odometry : wheels say so, and not
+    the motion so far.
     """
 
     step: SE2
     sigma_m: float
     sigma_rad: float
     drift_m: float
+    by_odometry: bool
 
     def information(self) -> Points:
         """(3, 3) inverse covariance; the same in every frame, as translation has no direction."""
@@ -80,10 +82,11 @@ class Predictor:
                 settings.odometry_sigma * self.unit_m + way,
                 math.radians(settings.odometry_sigma_deg) + abs(step.theta),
                 ODOMETRY_DRIFT * way,
+                True,
             )
         sigma_m = settings.motion_margin * self._spread_m
         return Prediction(
-            self.last_step, sigma_m, settings.motion_margin * self._spread_rad, sigma_m
+            self.last_step, sigma_m, settings.motion_margin * self._spread_rad, sigma_m, False
         )
 
     def observe(self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool) -> None:

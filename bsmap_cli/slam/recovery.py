@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from bsmap_cli.geometry.se2 import Points, Vector
+import numpy as np
+
+from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.correlative import Window, search
@@ -30,6 +33,9 @@ class RecoverySettings:
         maximum=1.0,
     )
     gain: float = setting(0.05, "a search result must be better by this share", minimum=0.0)
+    odometry_gain: float = setting(
+        0.15, "and by this more for each deviation that it lies off the odometry", minimum=0.0
+    )
     reach: float = setting(
         4.0, "half width of the search round a guess [finest knot steps]", minimum=0.0
     )
@@ -52,6 +58,7 @@ def recover(
     *,
     reach_rad: float,
     sigma_m: float,
+    odometry: Vector | None,
     recovery: RecoverySettings,
     registration: RegistrationSettings,
 ) -> RegistrationResult:
@@ -59,6 +66,9 @@ def recover(
 
     Odometry has jumps of its own and the last pose knows nothing of a gap in the log: both are
     guesses. What is found is refined without a prior, as the guess it came from may be far off.
+    odometry : where the wheels put the robot, for a map that grows with it. The farther a robot
+    drives between two scans, the better the second fits where the first was taken, since there the
+    map is: what contradicts the wheels must fit better by more.
     """
     cell_m = CELL_STEPS * submap.levels[-1].knot_step_m
     likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
@@ -78,6 +88,18 @@ def recover(
             sigma_m=sigma_m,
             settings=registration,
         )
-        if found.inlier_ratio > best.inlier_ratio + recovery.gain:
+        gain = recovery.gain
+        if odometry is not None:
+            if found.degenerate:
+                continue
+            gain += recovery.odometry_gain * _contradiction(found.pose, odometry, prior_information)
+        if found.inlier_ratio > best.inlier_ratio + gain:
             best = found
     return best
+
+
+def _contradiction(pose: Vector, odometry: Vector, information: Points) -> float:
+    """How many deviations a pose lies off the odometry; more than two mean as much as two."""
+    x, y, turn = pose - odometry
+    off = np.array([x, y, wrap_angle(turn)])
+    return min(2.0, math.sqrt(float(off @ information @ off)))
