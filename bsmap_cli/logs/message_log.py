@@ -63,7 +63,8 @@ class MessageLog(DrawnLog):
         motion = preview.motion(topics, report)
         mountings = Mountings(preview.tree, preview.base_frame(motion), self._options, report)
         frozen = frozenset(topic for topic in topics if preview.is_frozen(topic))
-        self._keep_only(frozenset((*topics, motion.topic)))
+        transforms = (None,) if preview.lacks_place else ()
+        self._keep_only(frozenset((*topics, motion.topic, *transforms)))
         return ScanStream(
             topics=topics,
             frozen=frozen,

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from bsmap_cli.logs.messages import TransformRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.transforms import (
     Matrix,
@@ -35,6 +36,7 @@ class Mountings:
         self._base_frame = base_frame
         self._options = options
         self._report = report
+        self._unplaced: set[str] = set()
 
     def of(self, frame: str, pose_frame_laser: tuple[float, ...] | None = None) -> Mounting:
         """The mounting of the laser with this frame; see `LaserRecord.pose_frame_laser`."""
@@ -54,6 +56,22 @@ class Mountings:
             )
         return mounting
 
+    def take_late(self, records: list[TransformRecord]) -> None:
+        """Tell the user of a place that comes when the laser was taken to be the base."""
+        if not self._unplaced:
+            return
+        for record in records:
+            self._tree.add(record)
+        for frame in sorted(self._unplaced):
+            base = self._base_frame or self._tree.likely_base(frame)
+            matrix = None if base is None else self._tree.matrix(base, frame)
+            if matrix is not None:
+                self._unplaced.discard(frame)
+                self._report.warn(
+                    f"the place of '{frame}' on {base} comes only after the first scans and is not"
+                    f" used: give --laser-pose {_as_flag(mounting_of(matrix))}"
+                )
+
     def _outer(self, frame: str, *, is_posed: bool) -> Matrix:
         base = self._base_frame
         if base is None:
@@ -61,6 +79,7 @@ class Mountings:
         matrix = None if base is None else self._tree.matrix(base, frame)
         if base is None or matrix is None:
             if not is_posed:
+                self._unplaced.add(frame)
                 self._report.places_unknown = True
                 self._report.warn(_taken_as_base(frame, base))
             return np.eye(4)
@@ -68,6 +87,12 @@ class Mountings:
             self._report.places_move = True
             self._report.warn(f"{frame} moves on {base}: its first place is used for the whole log")
         return matrix
+
+
+def _as_flag(mounting: Mounting) -> str:
+    pose = mounting.pose_base_laser
+    flip = ",flip" if mounting.upside_down else ""
+    return f"{pose.x:.4g},{pose.y:.4g},{math.degrees(pose.theta):.4g}{flip}"
 
 
 def _is_identity(matrix: Matrix) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from bsmap_cli.errors import LogError
-from bsmap_cli.logs import carmen, csv_scans, mcap_records, rosbag1_records, sqlite_container
+from bsmap_cli.logs import carmen_lines, csv_scans, mcap_records, rosbag1_records, sqlite_container
 from bsmap_cli.logs.byte_streams import DamagedBytesError, put_back, read_up_to
 from bsmap_cli.logs.carmen import CarmenParser
 from bsmap_cli.logs.csv_scans import CsvParser
@@ -106,7 +106,7 @@ def _text_kind(stream: BinaryIO) -> tuple[str | None, bytes]:
             break
         if not words or words[0].startswith(b"#"):
             continue
-        if words[0] in (carmen.FLASER, carmen.ROBOTLASER, *carmen.OTHER_WORDS):
+        if words[0] in carmen_lines.ALL_WORDS:
             return "CARMEN", read
         if is_first and csv_scans.is_header(line):
             return "CSV", read

@@ -19,9 +19,10 @@ from bsmap_cli.logs.messages import (
 from bsmap_cli.logs.motion import Motion, NoMotion, OdometryTopic, TransformMotion
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.topics import choose_odometry_topic, choose_scan_topics
-from bsmap_cli.logs.transforms import TransformTree, is_odom
+from bsmap_cli.logs.transforms import TransformTree, is_base, is_odom
 
 PREVIEW_NS = 2 * SECOND_NS
+SCANS = (Kind.SCAN, Kind.CLOUD)
 _PREVIEW_SCANS = 1000
 _PREVIEW_MESSAGES = 50_000
 _CONSTANT_STAMPS = 5
@@ -63,16 +64,31 @@ class Preview:
         if event.kind is Kind.TRANSFORMS and isinstance(event.record, list):
             for record in event.record:
                 self.tree.add(record)
-        self._scans += event.kind in (Kind.SCAN, Kind.CLOUD)
+        self._scans += event.kind in SCANS
         if self._scans >= _PREVIEW_SCANS or len(self.events) >= _PREVIEW_MESSAGES:
             return True
-        return self._is_scan_seen() and abs(event.log_time_ns - self._first_ns) >= PREVIEW_NS
+        is_late = abs(event.log_time_ns - self._first_ns) >= PREVIEW_NS
+        return is_late and self._is_scan_seen() and not self._is_place_to_come()
 
     def _is_scan_seen(self) -> bool:
         asked = self.options.topics
         if self.indexed is not None or not asked:
             return self._scans > 0
         return all(topic in self.seen or f"/{topic}" in self.seen for topic in asked)
+
+    def _is_place_to_come(self) -> bool:
+        """Whether a laser has no place yet, and the index tells of transforms that were not met."""
+        to_come = (c for c in self.indexed or () if kind_of(c) is Kind.TRANSFORMS)
+        return any(c.topic not in self.seen for c in to_come) and self.lacks_place
+
+    @property
+    def lacks_place(self) -> bool:
+        """Whether the place of some laser was neither met nor told."""
+        if self.options.pose_base_laser is not None:
+            return False
+        records = (self.first_record(c.topic) for c in self.seen.values() if kind_of(c) in SCANS)
+        frames = {r.frame for r in records if isinstance(r, LaserRecord | CloudRecord)}
+        return any(not is_base(f) and len(self.tree.ancestors(f)) == 1 for f in frames)
 
     def scan_topics(self, report: ReadReport) -> tuple[str, ...]:
         """The topics to read; see `choose_scan_topics`."""

@@ -90,6 +90,7 @@ class ScanStream:
                 self._motion.take_odometry(channel.topic, log_time_ns, record)
             else:
                 self._motion.take_transforms(log_time_ns, record)
+                self._mountings.take_late(record)
             if self._waiting:
                 yield from self._settled(log_time_ns)
         yield from self._settled(None)

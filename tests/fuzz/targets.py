@@ -121,7 +121,7 @@ def twin_of(data: bytes) -> bytes:
 TARGETS: dict[str, Callable[[], Target]] = {
     "bsm": lambda: Target(lambda d: read_map(io.BytesIO(d)), (MapFileError,), maps()),
     "csv": lambda: log_target("csv", "csv seconds"),
-    "carmen": lambda: log_target("carmen flaser", "carmen robotlaser"),
+    "carmen": lambda: log_target("carmen flaser", "carmen robotlaser", "carmen rawlaser"),
     "cdr": lambda: ros_target(is_ros1=False),
     "ros1": lambda: ros_target(is_ros1=True),
     "protobuf": foxglove_target,

@@ -451,6 +451,30 @@ def robotlaser(scan: Scan, laser: SE2 | None = None, remissions=(), farthest=0.0
     )
 
 
+def rawlaser(scan: Scan) -> str:
+    ranges = scan.ranges_m.tolist()
+    return (
+        f"RAWLASER1 0 {scan.angle_min_rad!r} {math.pi!r} {scan.angle_increment_rad!r} 0 0.01 0"
+        f" {len(ranges)} {numbers(ranges)} 0 {seconds(scan.stamp_ns)} host 0.5\n"
+    )
+
+
+def odom(stamp_ns: int, pose: SE2) -> str:
+    numbers = f"{pose.x!r} {pose.y!r} {pose.theta!r}"
+    return f"ODOM {numbers} 0.1 0.2 0 {seconds(stamp_ns)} host 0.1\n"
+
+
+def raw_carmen(scans) -> bytes:
+    """Raw lines have no pose: it stands in a line of its own, before or after the scan."""
+    parts = ["PARAM robot_frontlaser_offset 0.0 1.5 host 0.5\n"]
+    for index, scan in enumerate(scans):
+        pair = [rawlaser(scan)]
+        if scan.pose_odom_base is not None:
+            pair.insert(index % 2, odom(scan.stamp_ns, scan.pose_odom_base))
+        parts += pair
+    return "".join(parts).encode()
+
+
 def carmen(scans, line=flaser) -> bytes:
     head = "# a comment\nPARAM robot_frontlaser_offset 0.0 x 0 y 0\nSYNC a b\n"
     odom = "ODOM 1 2 3 0.1 0.2 0 1300000000.5 host 0.1\n"
@@ -533,6 +557,7 @@ MAKERS = {
     "lone db3": _db3,
     "carmen flaser": lambda p, s: _bytes(p, carmen(s)),
     "carmen robotlaser": lambda p, s: _bytes(p, carmen(s, robotlaser)),
+    "carmen rawlaser": lambda p, s: _bytes(p, raw_carmen(s)),
     "carmen.gz": lambda p, s: _bytes(p, pack(carmen(s), ".gz")),
     "carmen.zst": lambda p, s: _bytes(p, pack(carmen(s), ".zst")),
     "csv": lambda p, s: _bytes(p, csv(s)),

@@ -7,6 +7,7 @@ import pytest
 
 from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.canonical import canonical_pose
 from bsmap_cli.logs.open_log import open_log
 from bsmap_cli.logs.reader import ReadOptions
 from tests.logs.making import (
@@ -59,6 +60,25 @@ def test_two_topics_are_the_users_choice(tmp_path):
         assert {scan.topic for scan in found} == {"/rear/scan"}
     found, _ = read(path, topics=("/front/scan", "/rear/scan"))
     assert [scan.topic for scan in found[:4]] == ["/front/scan", "/rear/scan"] * 2
+
+
+def test_a_place_that_comes_late(tmp_path):
+    """A file with an index is read on until it comes; a stream has no such patience."""
+    pose = canonical_pose(0.25, -0.5, math.pi / 2)
+    static = ROS.transforms(planar(T0, "base_link", "laser", pose))
+    messages = merged(on("/scan", count=300), [("/tf_static", TF, T0 + 9000 * MS, static)])
+    path = written(tmp_path, messages)
+    found, report = read(path)
+    assert len(found) == 300
+    assert {scan.pose_base_laser for scan in found} == {pose}
+    assert report.warnings == []
+    with path.open("rb") as stream:
+        found, report = read(stream)
+    assert len(found) == 300
+    assert {scan.pose_base_laser for scan in found} == {SE2.identity()}
+    assert report.places_unknown
+    assert "--laser-pose 0.25,-0.5,90" in report.warnings[1]
+    assert read(path, pose_base_laser=SE2(1.0, 0.0, 0.0))[1].warnings == []
 
 
 def test_a_topic_that_starts_later_counts_where_an_index_tells(tmp_path):

@@ -23,7 +23,7 @@ from tests.logs.making import (
 
 SCANS = some_scans(80, 61)
 KINDS = [kind for kind in MAKERS if not kind.startswith("ros2")]
-TEXT = ("carmen flaser", "csv", "csv seconds", "carmen robotlaser")
+TEXT = ("carmen flaser", "csv", "csv seconds", "carmen robotlaser", "carmen rawlaser")
 EXACT = ("mcap no chunks", "mcap plain chunks", "bag", *TEXT)
 CHUNKED = [kind for kind in KINDS if kind.startswith("mcap ") and kind != "mcap no chunks"]
 CHECKED = [*CHUNKED, "mcap no chunks", *(kind for kind in KINDS if kind.endswith(("gz", "zst")))]
@@ -66,7 +66,9 @@ def ends_of(data, kind):
     if kind in TEXT:
         lines = data.splitlines(keepends=True)
         ends = np.cumsum([len(line) for line in lines])
-        is_scan = [line.startswith((b"FLASER", b"ROBOTLASER1", b"1")) for line in lines]
+        is_scan = [
+            line.startswith((b"FLASER", b"ROBOTLASER1", b"RAWLASER1", b"1")) for line in lines
+        ]
         return [int(end) for end, scan in zip(ends, is_scan, strict=True) if scan]
     beams = len(SCANS[0].ranges_m)
     return [data.index(scan.ranges_m.tobytes()) + 8 * beams + 4 for scan in SCANS]

@@ -20,6 +20,8 @@ from tests.logs.making import (
     csv,
     flaser,
     float32,
+    odom,
+    rawlaser,
     read,
     robotlaser,
     seconds,
@@ -106,6 +108,54 @@ def test_the_lasers_place_where_the_lines_agree(tmp_path, line, place):
     assert report.warnings == []
 
 
+def test_raw_lines_take_poses_between_odometry_lines(tmp_path):
+    scans = WIDE[:3]
+    start = scans[0].stamp_ns
+    step = 100_000_000
+    scans = [dataclasses.replace(s, stamp_ns=start + i * step) for i, s in enumerate(scans)]
+    before, after = SE2(1.0, 2.0, 0.5), SE2(3.0, 2.0, 0.7)
+    lines = [
+        "PARAM robot_frontlaser_offset 0.04 1.5 host 0.5\n",
+        odom(start - step, before),
+        *map(rawlaser, scans),
+        "ODOM what\n",
+        odom(start + 3 * step, after),
+    ]
+    found, report = read(written(tmp_path, "".join(lines).encode()))
+    assert [scan.pose_odom_base.x for scan in found] == pytest.approx([1.5, 2.0, 2.5])
+    assert [scan.pose_odom_base.theta for scan in found] == pytest.approx([0.55, 0.6, 0.65])
+    assert {scan.pose_base_laser for scan in found} == {SE2(0.04, 0.0, 0.0)}
+    assert (report.warnings, report.odometry) == ([], "poses in the log")
+
+
+def test_raw_lines_without_odometry_or_place(tmp_path):
+    path = written(tmp_path, b"".join(rawlaser(scan).encode() for scan in SCANS))
+    found, report = read(path)
+    assert_same(found, SCANS, odometry=False)
+    assert report.odometry == "none"
+    assert report.places_unknown
+
+
+def test_raw_lines_are_the_same_scans_once_more(tmp_path):
+    lines = carmen(SCANS, lambda scan: rawlaser(scan) + robotlaser(scan))
+    path = written(tmp_path, lines)
+    assert_same(read(path)[0], SCANS)
+    raw, _ = read(path, topics=("RAWLASER1",))
+    assert [scan.stamp_ns for scan in raw] == [scan.stamp_ns for scan in SCANS]
+    assert {scan.topic for scan in raw} == {"RAWLASER1"}
+
+
+def test_a_robot_that_drives_before_its_laser_runs(tmp_path):
+    many = b"ODOM 1 2 3 0 0 0 1300000000.5 host 0.1\n" * 60_000
+    found, _ = read(written(tmp_path, many + carmen(SCANS)))
+    assert_same(found, SCANS)
+
+
+def test_a_log_of_bad_lines_alone(tmp_path):
+    with pytest.raises(LogError, match="no scan that can be read, the first because: line 1 of"):
+        read(written(tmp_path, b"FLASER 9 1 2 3\n" * 30_000))
+
+
 def test_corrected_logs_tell_no_place(tmp_path):
     """The first triple is a pose of another map: it drifts from the odometry."""
     drift = iter(range(1000))
@@ -160,9 +210,9 @@ def test_poses_can_be_left_out(tmp_path):
         found, report = read(path, odom="none")
         assert_same(found, SCANS, odometry=False)
         assert report.odometry == "none"
-        for odom in ("tf", "/odom"):
+        for asked in ("tf", "/odom"):
             with pytest.raises(UsageError, match="--odom"):
-                read(path, odom=odom)
+                read(path, odom=asked)
 
 
 def test_a_log_without_scans(tmp_path):
