@@ -117,6 +117,8 @@ def make_map(
         tell_warnings(reader.report, talk)
         losses = (*reading_losses(reader.report), *run.losses)
         code = exit_code(losses, strict=making.strict, talk=talk)
+        if not any(len(level) for level in run.document.levels):
+            talk.warn("the map is empty: no scan has returns side by side; see `bsmap check`")
         write_began = perf_counter()
         document = _final_document(run.document, making, log.logs)
         encoded = BytesIO()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from bsmap_cli.logs.open_log import open_log
@@ -101,6 +102,15 @@ def test_a_damaged_map_is_refused_with_its_place(how, share, here):
     assert ran.returncode == 1
     assert message(ran).startswith("error: bad.bsm: ")
     assert "byte" in message(ran)
+
+
+def test_a_log_without_a_return_gives_an_empty_map_and_says_so(tmp_path):
+    blind = [replace(scan, ranges_m=np.full_like(scan.ranges_m, np.nan)) for scan in LOG]
+    MAKERS["mcap zstd"](tmp_path / "log", blind)
+    ran = bsmap("slam", "log", "-o", "m.bsm", "-q", cwd=tmp_path)
+    assert ran.returncode == 0
+    assert message(ran).startswith("warning: the map is empty")
+    assert b"\n0.1 m      0 " in bsmap("stats", "m.bsm", cwd=tmp_path).stdout
 
 
 def test_names_out_of_a_file_do_not_steer_the_terminal(tmp_path):
