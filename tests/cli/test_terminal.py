@@ -135,6 +135,17 @@ def test_the_shell_completes_verbs_and_options():
     assert completions(["bsmap", "slam", "--color", "a"]) == ["auto", "always"]
 
 
+def test_completion_works_in_a_shell_after_it_was_installed(tmp_path):
+    line = (
+        f"export HOME={tmp_path} SHELL=/bin/bash; bsmap --install-completion && . ~/.bashrc"
+        " && COMP_WORDS=(bsmap slam --la) COMP_CWORD=2 && _bsmap_completion bsmap"
+        " && echo ${COMPREPLY[@]}"
+    )
+    ran = shell(line, tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.decode().split()[-1] == "--laser-pose"
+
+
 def test_the_completion_script_is_that_of_the_shell_in_use(tmp_path):
     ran = shell("bsmap --show-completion; true", tmp_path)
     assert b"complete -o default -F _bsmap_completion bsmap" in ran.stdout
