@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -205,9 +206,14 @@ def _describe(logs: tuple[str, ...]) -> list[dict[str, Any]]:
     return [
         {"name": "standard input"}
         if log == STDIN
-        else {"name": Path(log).resolve().name, "bytes": _bytes_of(Path(log))}
+        else {"name": _utf8(Path(log).resolve().name), "bytes": _bytes_of(Path(log))}
         for log in logs
     ]
+
+
+def _utf8(name: str) -> str:
+    """The name of a file, whose bytes need not be text."""
+    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def _bytes_of(path: Path) -> int:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import io
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import BinaryIO, Protocol
 
 GZIP_MAGIC = b"\x1f\x8b"
@@ -32,6 +34,15 @@ class _Decompressor(Protocol):
     def decompress(self, data: bytes, /) -> bytes: ...
 
 
+@contextmanager
+def _failing_disk() -> Iterator[None]:
+    """A bad sector, or a share that went away, is damage like any other."""
+    try:
+        yield
+    except OSError as error:
+        raise DamagedBytesError(f"reading fails ({error.strerror or error})") from error
+
+
 class _Unread(io.RawIOBase):
     """A stream with bytes put back in front of it."""
 
@@ -48,7 +59,8 @@ class _Unread(io.RawIOBase):
         if data:
             self._front = self._front[len(data) :]
         else:
-            data = self._read_some(len(buffer)) or b""
+            with _failing_disk():
+                data = self._read_some(len(buffer)) or b""
         buffer[: len(data)] = data
         return len(data)
 
@@ -118,7 +130,8 @@ def is_packed(start: bytes) -> bool:
 
 def unpack(stream: BinaryIO) -> BinaryIO:
     """The bytes behind `.gz` or `.zst`, told by their magic; other streams as they are."""
-    start = read_up_to(stream, len(ZSTD_MAGIC))
+    with _failing_disk():
+        start = read_up_to(stream, len(ZSTD_MAGIC))
     rest = put_back(start, stream)
     for magic in (GZIP_MAGIC, ZSTD_MAGIC):
         if start.startswith(magic):

@@ -39,7 +39,7 @@ def open_log(sources: Sequence[str | Path | BinaryIO], options: ReadOptions) -> 
     try:
         reader = _reader([str(source) for source in sources], named, options)
         for missing in dict.fromkeys(part for source in named for part in source.lacks):
-            reader.report.lose(f"{missing} is missing from its bag; the other parts are used")
+            reader.report.lose(f"{missing} is missing from its folder; the other parts are used")
         return reader
     except BaseException:
         for source in named:

@@ -25,7 +25,7 @@ class Source:
     name : for messages to the user.
     path : the file, or None for a stream.
     found : whether the source was come upon in a folder rather than named by the user.
-    lacks : parts of the same bag that its `metadata.yaml` names and that are not there.
+    lacks : parts of the same folder that a `metadata.yaml` or a link names and that are not there.
     ours : the stream below `stream` that was opened here, to be closed here.
     """
 
@@ -129,9 +129,11 @@ def _parts(source: Source) -> list[Source]:
     except OSError as error:
         raise LogError(f"cannot open {path}: {error.strerror or error}") from error
     children = [child for child in children if not child.is_dir() or _is_bag_folder(child)]
+    dangling = tuple(child.name for child in children if not child.exists())
+    children = [child for child in children if child.name not in dangling]
     if not children:
         raise LogError(f"{path} is a folder without a log: name a log")
-    lacks = _missing_parts(path, [child.name for child in children])
+    lacks = dangling + _missing_parts(path, [child.name for child in children])
     return [
         part
         for child in children

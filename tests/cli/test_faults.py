@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -111,6 +112,29 @@ def test_a_log_without_a_return_gives_an_empty_map_and_says_so(tmp_path):
     assert ran.returncode == 0
     assert message(ran).startswith("warning: the map is empty")
     assert b"\n0.1 m      0 " in bsmap("stats", "m.bsm", cwd=tmp_path).stdout
+
+
+def test_a_log_whose_name_is_no_text(here):
+    name = b"\xff\xfe.mcap"
+    (here / "run.mcap").rename(os.fsdecode(os.fsencode(here) + b"/" + name))
+    ran = bsmap("slam", os.fsdecode(name), "-o", "m.bsm", "-q", cwd=here)
+    assert (ran.returncode, ran.stderr) == (0, b"")
+    assert bsmap("stats", "m.bsm", cwd=here).returncode == 0
+
+
+@pytest.mark.parametrize("flag", ["--start", "--end", "--duration", "--angle-min"])
+@pytest.mark.parametrize("number", ["inf", "1e400", "nan"])
+def test_numbers_that_are_none(flag, number, here):
+    ran = bsmap("scans", "run.mcap", "-o", "x.csv", flag, number, cwd=here)
+    assert ran.returncode == 2
+    assert flag in message(ran)
+
+
+def test_a_disk_that_fails_to_read():
+    """Nothing can be read at the start of this file, as of a bad sector."""
+    ran = bsmap("info", "/proc/self/mem")
+    assert ran.returncode == 1
+    assert message(ran) == "error: mem: reading fails (Input/output error)"
 
 
 def test_names_out_of_a_file_do_not_steer_the_terminal(tmp_path):

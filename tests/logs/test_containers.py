@@ -126,6 +126,38 @@ def test_a_part_that_is_missing_is_told(tmp_path):
     assert "bag_1.mcap" in report.warnings[0]
 
 
+def test_a_link_to_nowhere_is_a_part_that_is_missing(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    MAKERS["csv"](folder / "part_1.csv", SCANS[:9])
+    (folder / "part_2.csv").symlink_to(tmp_path / "nowhere")
+    found, report = read(folder)
+    assert_same(found, SCANS[:9])
+    assert report.truncated
+    assert "part_2.csv is missing" in report.warnings[0]
+
+
+def test_a_file_that_can_be_read_in_part(tmp_path):
+    """What a bad sector leaves of a log is used."""
+
+    class Failing(io.BytesIO):
+        def read(self, count=-1, /):
+            if self.tell() > len(data) // 2:
+                raise OSError(5, "Input/output error")
+            return super().read(count)
+
+        read1 = read
+
+    for kind in ("mcap zstd", "bag", "csv", "carmen.gz"):
+        (tmp_path / kind).mkdir()
+        data = MAKERS[kind](tmp_path / kind / "log", SCANS).read_bytes()
+        found, report = read(Failing(data))
+        assert_same(found, SCANS[: len(found)])
+        assert report.truncated
+        assert any("reading fails (Input/output error)" in warning for warning in report.warnings)
+        assert len(found) > 50, kind
+
+
 def test_bags_without_definitions(tmp_path):
     """ROS 2 bags older than Iron carry none."""
     import sqlite3

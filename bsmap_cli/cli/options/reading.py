@@ -121,6 +121,7 @@ class ReadFlags:
         """What the reader is asked for."""
         from bsmap_cli.logs.reader import ReadOptions
 
+        self._check_finite()
         pose, flipped = parse_laser_pose(self.laser_pose)
         end_s = self._end_s()
         if end_s is not None and end_s <= (self.start or 0.0):
@@ -141,6 +142,18 @@ class ReadFlags:
             z_min_m=self.z_min,
             z_max_m=self.z_max,
         )
+
+    def _check_finite(self) -> None:
+        given = {
+            "--start": self.start,
+            "--end": self.end,
+            "--duration": self.duration,
+            "--angle-min": self.angle_min,
+            "--angle-increment": self.angle_increment,
+        }
+        for flag, value in given.items():
+            if value is not None and not math.isfinite(value):
+                raise UsageError(f"{flag} {value}: give a finite number")
 
     def _end_s(self) -> float | None:
         if self.duration is None:
