@@ -26,6 +26,8 @@ VERBS = (
         "plot",
         "view",
         "query",
+        "diff",
+        "merge",
         "sim",
         "scans",
         "warmup",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.errors import UsageError
 from bsmap_cli.geometry.curve import Curve
-from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.geometry.se2 import SE2, Points, Vector
 
 CLOSED = 1  # flag bit 0: the curve's end meets its start
 TENTATIVE = 2  # flag bit 1: seen from too few viewpoints to be trusted
@@ -61,6 +61,11 @@ class MapLevel:
             tau_start_m=start_m + float(self.tau_start_m[index]),
             tau_end_m=start_m + float(self.tau_end_m[index]),
         )
+
+    def moved(self, pose_new_old: SE2) -> MapLevel:
+        """The same curves in another frame."""
+        points = pose_new_old.transform(self.control_points.astype(np.float64))
+        return replace(self, control_points=points.astype(np.float32))
 
     def __iter__(self) -> Iterator[Curve]:
         rows = self.offsets()

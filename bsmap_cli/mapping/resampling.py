@@ -30,9 +30,13 @@ class _Fitted(NamedTuple):
     weights: Vector
 
 
-def resampled_level(level: MapLevel, knot_step_m: float) -> MapLevel:
-    """Every drawn piece as a curve of knot step `knot_step_m`, with the same tau and frame."""
-    matrix = basis_matrix(level.degree)
+def resampled_level(level: MapLevel, knot_step_m: float, degree: int | None = None) -> MapLevel:
+    """Every drawn piece as a curve of knot step `knot_step_m`, with the same tau and frame.
+
+    degree : of the new curves; None: as before.
+    """
+    degree = level.degree if degree is None else degree
+    matrix = basis_matrix(degree)
     samples = sample_level(level, min(level.knot_step_m, knot_step_m) / SAMPLES_PER_STEP)
     u = samples.tau_m / knot_step_m
     bounds = np.flatnonzero(np.diff(samples.piece, prepend=-1, append=-2))
@@ -46,7 +50,7 @@ def resampled_level(level: MapLevel, knot_step_m: float) -> MapLevel:
         )
         if piece is not None:
             fitted.append(piece)
-    return _as_level(level, knot_step_m, fitted)
+    return _as_level(level, knot_step_m, degree, fitted)
 
 
 def one_level(document: MapDocument) -> MapLevel:
@@ -77,14 +81,14 @@ def _fit(
     return _Fitted(curve, low, float(u[0]), float(u[-1]), found, weights)
 
 
-def _as_level(level: MapLevel, knot_step_m: float, fitted: list[_Fitted]) -> MapLevel:
+def _as_level(level: MapLevel, knot_step_m: float, degree: int, fitted: list[_Fitted]) -> MapLevel:
     curve = np.array([piece.curve for piece in fitted], np.int64)
-    first = np.array([piece.low for piece in fitted], np.int64) - level.degree
+    first = np.array([piece.low for piece in fitted], np.int64) - degree
     start = np.array([piece.start_u for piece in fitted], np.float64)
     end = np.array([piece.end_u for piece in fitted], np.float64)
     weights = np.concatenate([np.zeros(0), *(piece.weights for piece in fitted)])
     return MapLevel(
-        degree=level.degree,
+        degree=degree,
         knot_step_m=knot_step_m,
         curve_ids=np.arange(len(fitted), dtype=np.uint32),
         tau_start_m=((start - first) * knot_step_m).astype(np.float32),

@@ -29,7 +29,7 @@ def _advance(points: Points, tangents: Points, j: int) -> float:
 
 
 @kernel
-def _run_parameters(
+def run_parameters(
     run: NDArray[np.int64],
     curves: NDArray[np.int64],
     u: Vector,
@@ -100,7 +100,7 @@ def merge_runs(
         begin, end = runs[r, BEGIN], runs[r, END]
         curve = runs[r, CURVE]
         run_u, weights = np.empty(end - begin), np.empty(end - begin)
-        _run_parameters(
+        run_parameters(
             runs[r], curves, u, points, tangents, matrix, knot_step_m, first_penalty, run_u
         )
         rows = math.ceil(np.max(run_u) - np.min(run_u)) + 2 * matrix.shape[0]

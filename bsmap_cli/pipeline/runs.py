@@ -212,15 +212,7 @@ def _in_first_frame(
 ) -> tuple[MapDocument, Trajectory]:
     """The same map and trajectory in the frame of the first pose, which refinement has moved."""
     pose_first_map = SE2.from_array(trajectory.poses[0]).inverse()
-    levels = tuple(
-        replace(
-            level,
-            control_points=pose_first_map.transform(level.control_points.astype(float)).astype(
-                np.float32
-            ),
-        )
-        for level in document.levels
-    )
+    levels = tuple(level.moved(pose_first_map) for level in document.levels)
     return replace(document, levels=levels), Trajectory(
         trajectory.stamps_ns, transform_poses(pose_first_map, trajectory.poses)
     )
