@@ -75,12 +75,15 @@ class LiveFlags:
             return work
 
         def shown(reader: LogReader, settings: Settings, progress: Progress) -> Run:
+            from bsmap_cli.cli.progress import STARTING
             from bsmap_cli.exchange.live_view import LiveView
 
             with LiveView(PORT if self.live_port is None else self.live_port) as view:
                 talk.note(f"live view: open {view.address} in Foxglove")
+                progress.stage("waiting for Foxglove")
                 if not view.wait(WAIT_S if self.live_wait is None else self.live_wait):
                     talk.note("live view: nobody looks yet; the run goes on")
+                progress.stage(STARTING)
                 return work(reader, settings, progress, view)
 
         return shown

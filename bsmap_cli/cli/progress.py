@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SHORTEST_REFRESH_S = 0.1
 SLOW_START_S = 3.0
+STARTING = "starting (the first run compiles)"
 
 
 @contextmanager
@@ -45,7 +46,7 @@ def progress_bar(
     )
     console = Console(stderr=True, no_color=not talk.colored(sys.stderr), highlight=False)
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("starting (the first run compiles)", total=total, figures="")
+        task = bar.add_task(STARTING, total=total, figures="")
         yield _Bar(talk, started, bar, task)
 
 
@@ -67,6 +68,11 @@ class _Plain(Silent):
             waited_s = perf_counter() - self._began
             if waited_s > SLOW_START_S:
                 self._talk.note(compiled_note(waited_s))
+            self._began = perf_counter()
+
+    def stage(self, name: str) -> None:
+        """What took time before the first scan was not the compiler."""
+        if not self._started:
             self._began = perf_counter()
 
 
@@ -92,5 +98,8 @@ class _Bar(_Plain):
         self._bar.update(self._task, description="scans", completed=count, figures=figures)
 
     def stage(self, name: str) -> None:
-        """Another task, of unknown length."""
-        self._bar.update(self._task, description=name, total=None, figures="")
+        """Another task; after the scans of unknown length."""
+        super().stage(name)
+        if self._started:
+            self._bar.update(self._task, total=None, figures="")
+        self._bar.update(self._task, description=name)

@@ -60,8 +60,10 @@ class LiveView:
                 server_listener=listener,
             )
         except (RuntimeError, OSError) as error:
+            reason = str(error).rpartition(": ")[2]
             raise BsmapError(
-                f"nothing can be served on port {port} of {HOST} ({error}): another --live-port?"
+                f"nothing can be served on port {port} of {HOST}: {reason}; choose another with "
+                "--live-port, or 0 for any"
             ) from error
         self._clock_ns = 0
         self._shown_s = self._drawn_s = float("-inf")
