@@ -41,10 +41,10 @@ class LiveView:
         try:
             import foxglove
             from foxglove.websocket import Capability
+
+            from bsmap_cli.exchange import live_messages
         except ImportError as error:
             raise BsmapError("the live view needs its extra: pip install 'bsmap[live]'") from error
-        from bsmap_cli.exchange import live_messages
-
         self._make = live_messages
         context = self._context = foxglove.Context()  # channels end with it
         self._channels = _Channels(context)
