@@ -97,9 +97,10 @@ class SubmapGraph:
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
         local = self._local
-        begin, end = local.submaps[k - 1].keyframes[0], local.submaps[k - 1].keyframes[-1] + 1
-        if local.submaps[k].keyframes:
-            end = local.submaps[k].keyframes[0] + 1
+        before, behind = local.submaps[k - 1].keyframes, local.submaps[k].keyframes
+        # one begun with the last keyframe stays empty where tracking is lost next
+        begin = before[0] if before else behind[0] - 1
+        end = behind[0] + 1 if behind else before[-1] + 1
         way = coasted = 0.0
         weak = False
         for index in range(begin + 1, min(end, len(local.keyframes))):

@@ -28,6 +28,8 @@ def tracked_levels(
     """
     parts = []
     for submap in submaps:
+        if not submap.keyframes:  # begun with the last keyframe
+            continue
         first = submap.keyframes[0]
         seen = submap.to_submap(keyframes[first].pose_local)
         pose_map_submap = SE2.from_array(poses[first]) @ seen.inverse()

@@ -10,8 +10,11 @@ import pytest
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import SegmentationSettings
 from bsmap_cli.sensor.simulator.simulation import simulate
+from bsmap_cli.slam.final_map import FinalMapSettings
+from bsmap_cli.slam.keyframes import KeyframeSettings
 from bsmap_cli.slam.slam import Slam
 from bsmap_cli.slam.slam_settings import SlamSettings
+from bsmap_cli.slam.submap import SubmapSettings
 
 DEFAULT = SlamSettings()
 
@@ -213,3 +216,20 @@ def test_every_degree_makes_a_map():
         metres, _ = errors(result.trajectory.poses, sim.truth.poses[:60])
         assert metres.max() < 0.03
         assert result.document.finest.degree == degree
+
+
+@pytest.mark.parametrize("overrides", [{}, {"final_map": FinalMapSettings(rebuild=False)}])
+@pytest.mark.parametrize("before", range(2, 7))
+def test_tracking_may_be_lost_with_any_number_of_keyframes_in_a_submap(before, overrides):
+    """A submap begun just before stays empty; one begun with the last keyframe is empty, too."""
+    settings = SlamSettings(
+        keyframes=KeyframeSettings(distance=0.0), submaps=SubmapSettings(keyframes=4), **overrides
+    )
+    here = list(itertools.islice(simulated("wall").scans(), before))
+    elsewhere = list(itertools.islice(simulated("shapes").scans(), 8))
+    begin_ns = here[-1].stamp_ns + 125_000_000 - elsewhere[0].stamp_ns
+    elsewhere = [replace(scan, stamp_ns=scan.stamp_ns + begin_ns) for scan in elsewhere]
+    result = run(here + elsewhere, settings)
+    assert len(result.figures["tracking_lost"]) == 1
+    assert np.isfinite(result.trajectory.poses).all()
+    assert len(result.document.finest) > 0
