@@ -64,8 +64,10 @@ class KnownMap(Submap):
         found = self.places(points, tangents, worse=uniqueness)
         return found[0] if len(found) == 1 else None
 
-    def places(self, points: Points, tangents: Points, *, worse: float) -> list[Peak]:
-        """The best place in the whole map, and its best rival elsewhere.
+    def places(
+        self, points: Points, tangents: Points, *, worse: float, least: float = LEAST_SCORE
+    ) -> list[Peak]:
+        """The best place in the whole map that scores `least`, and its best rival elsewhere.
 
         That is left out where its score is less than that of the best divided by `worse`.
         """
@@ -76,7 +78,7 @@ class KnownMap(Submap):
         points, tangents = points[::every].copy(), tangents[::every].copy()
         reach_m = 0.5 * float((self._high - self._low).max()) + MARGIN_STEPS * unit
         window = Window(np.array([*(0.5 * (self._low + self._high)), 0.0]), reach_m, math.pi)
-        peak = search(likelihood, points, tangents, window, floor=LEAST_SCORE)
+        peak = search(likelihood, points, tangents, window, floor=least)
         if peak is None:
             return []
         rival = search(

@@ -10,6 +10,7 @@ import numpy as np
 from bsmap_cli.errors import TrackingError
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.visibility import HIT, MISS, look_at
 from bsmap_cli.slam.correlative import Peak, Window, search
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap
 from bsmap_cli.slam.ladder import register_down
@@ -25,12 +26,16 @@ LENGTHS, APART = (40, 10), 20  # keyframes of a stretch, and from the start of o
 SEARCHED = 24  # stretches, spread over the log, that are searched for first
 ENOUGH = 5  # places that agree, and none that does not: no more is searched for
 AGREEING = 0.75  # share of a stretch's keyframes that must fit the place found for it
+LEAST_SCORE = 0.65  # of a stretch that may lie at a place
 RIVAL = 1.25  # a place elsewhere that scores worse by more is none
 BETTER = 1.05  # share of points on old curves, as many times that at the rival
 FEWEST = 3  # keyframes of a stretch; and what must speak for a place
 APART_STEPS, APART_SHARE = 10.0, 0.05  # two places agree: finest knot steps, of the way between
-JUDGED_STEPS = 300.0  # way from a place on which drift does not matter [finest knot steps]
-NEAR_STEPS, NEAR_SHARE = 10.0, 0.6  # a keyframe so near old curves that it should lie on them
+JUDGED_STEPS = 300.0  # way from a place on which keyframes are asked [finest knot steps]
+# share of the old spans in view that a keyframe looks through: by chance; where it is misplaced
+MISSED, MISPLACED = 0.02, 0.1
+# without that: share of its points by old curves, and not on them [finest knot steps]
+ON_STEPS, NEAR_STEPS, BESIDE_SHARE = 0.75, 10.0, 0.3
 
 NO_PLACE = (
     "the log has no place in the old map, or more than one: is it a log of that place, and long "
@@ -155,7 +160,7 @@ class PlaceFinder:
         points, tangents = self._surfaces(stretch)
         if len(points) < FEWEST_POINTS:
             return None
-        peaks = self._known.places(points, tangents, worse=RIVAL)
+        peaks = self._known.places(points, tangents, worse=RIVAL, least=LEAST_SCORE)
         found = [self._verified(stretch, peak) for peak in peaks]
         return self._only(found)
 
@@ -208,23 +213,47 @@ class PlaceFinder:
     def _told(self, place: Place, poses: Points) -> float:
         """What the keyframes near a place say for it, less what those say that contradict it.
 
-        A keyframe that fits counts by how much of it lies on old curves; one that lies by old
-        curves and does not fit is against it.
+        Outwards from the place keyframe follows keyframe, each beginning where the last one that
+        fits has put the log: drift does not count. One that fits counts by how much of it lies
+        on old curves; one that lies by old curves and does not fit is against it.
         """
-        pose_map_log = self._frame(place, poses)
-        reach_m = JUDGED_STEPS * self._unit
         told = 0.0
-        for k, frame in enumerate(self._local.keyframes):
-            if abs(float(self.way_m[k] - self.way_m[place.stretch[0]])) > reach_m:
-                continue
-            pose = pose_map_log @ SE2.from_array(poses[k])
-            result = self.registered(k, pose.as_array())
-            if self.fits(result):
-                least = self._settings.loops.min_inliers
-                told += (result.inlier_ratio - least) / (1.0 - least)
-                continue
-            seen = pose.transform(frame.clusters.points[::4].astype(np.float64))
-            if len(seen):
-                near = self._tree.query(seen)[0] < NEAR_STEPS * self._unit
-                told -= float(np.mean(near) >= NEAR_SHARE)
+        first, count = place.stretch[0], len(self._local.keyframes)
+        for way in (range(first, count), range(first - 1, -1, -1)):
+            frame = self._frame(place, poses)
+            for k in way:
+                if abs(float(self.way_m[k] - self.way_m[first])) > JUDGED_STEPS * self._unit:
+                    break
+                said, frame = self._said(k, SE2.from_array(poses[k]), frame)
+                told += said
         return told
+
+    def _said(self, k: int, pose: SE2, pose_map_log: SE2) -> tuple[float, SE2]:
+        """What one keyframe, at a pose in the log, says for a place; where it puts the log."""
+        start = pose_map_log @ pose
+        result = self.registered(k, start.as_array())
+        if not self.fits(result):
+            return -self._contradiction(k, start), pose_map_log
+        found = SE2.from_array(result.pose)
+        least = self._settings.loops.min_inliers
+        said = (result.inlier_ratio - least) / (1.0 - least) - self._contradiction(k, found)
+        return said, found @ pose.inverse()
+
+    def _contradiction(self, k: int, pose_map_base: SE2) -> float:
+        """How much a keyframe speaks against a place, 0 to 1: it looks through old curves there.
+
+        Where nothing is known of what it looks through, all that fit badly speak against it.
+        """
+        frame = self._local.keyframes[k]
+        if frame.sight is not None:
+            pose, sigma_m = pose_map_base.as_array(), self._local.sigma_m
+            look = look_at(self._known.levels[-1], frame.sight, pose, sigma_m)
+            hits, misses = int((look.verdicts == HIT).sum()), int((look.verdicts == MISS).sum())
+            share = misses / max(misses + hits, FEWEST_POINTS)
+            return min(1.0, max(0.0, (share - MISSED) / (MISPLACED - MISSED)))
+        seen = pose_map_base.transform(frame.clusters.points[::4].astype(np.float64))
+        if not len(seen):
+            return 0.0
+        distance = self._tree.query(seen)[0]
+        beside = (distance > ON_STEPS * self._unit) & (distance < NEAR_STEPS * self._unit)
+        return float(np.mean(beside) >= BESIDE_SHARE)
