@@ -14,6 +14,7 @@ from bsmap_cli.logs.reader import LogInfo, LogReader, ReadReport
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.pipeline.localize import run_localize
 from bsmap_cli.pipeline.runs import run_map, run_slam
+from bsmap_cli.pipeline.two_maps import merge_maps, place_map
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.simulator.simulation import Simulation, simulate
 
@@ -68,6 +69,7 @@ def _rehearsals() -> Iterator[Callable[[], object]]:
     known: MapDocument = run_map(_Rehearsed(made), made.truth, default).document
     yield lambda: run_localize(_Rehearsed(made), known, default)
     yield lambda: run_slam(_Rehearsed(made), default, old=known)
+    yield lambda: merge_maps(known, known, place_map(known, known, default), default)
 
 
 class _Rehearsed:

@@ -56,6 +56,7 @@ RUNS = {
     "map": ["map", SAMPLES / "wall.mcap", "--poses", SAMPLES / "wall.truth.tum", "-o", "x.bsm"],
     "map-paper": ["map", "run.mcap", "--poses", "odom", "-o", "x.bsm", "--profile", "paper"],
     "localize": ["localize", "run.mcap", "--map", "map.bsm", "--traj", "x.tum"],
+    "merge": ["merge", "map.bsm", "map.bsm", "-o", "x.bsm"],
     "sim": ["sim", "people", "--lidar", "urg04lx", "-o", "x.mcap"],
     "query": ["query", "map.bsm", "ray", "0,0,90"],
     "stats": ["stats", "map.bsm"],
