@@ -10,6 +10,8 @@ import pytest
 from bsmap_cli.errors import TrackingError
 from bsmap_cli.evaluation.redundancy import redundancy
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.open_log import open_log
+from bsmap_cli.logs.reader import ReadOptions
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.sampling import sample_level
 from bsmap_cli.sensor.simulator.simulation import simulate
@@ -17,7 +19,7 @@ from bsmap_cli.slam.known_map import KnownMap, settings_for_map
 from bsmap_cli.slam.slam import Slam
 from bsmap_cli.slam.slam_settings import SlamSettings
 from tests.maps import make_level
-from tests.slam.test_localization import errors
+from tests.slam.test_localization import DATA, errors
 
 DEFAULT = SlamSettings()
 
@@ -134,3 +136,19 @@ def test_two_runs_give_the_same_bytes(loop, first_half):
     one, two = run(scans, first_half.document), run(scans, first_half.document)
     assert np.array_equal(one.trajectory.poses, two.trajectory.poses)
     assert np.array_equal(one.document.finest.control_points, two.document.finest.control_points)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="no real logs in ../shared/data")
+def test_a_real_log_goes_on_where_it_was_cut_in_two():
+    with open_log([str(DATA / "mit-csail.clf.gz")], ReadOptions(end_s=110.0)) as reader:
+        scans = list(reader.scans())
+    cut, begin = len(scans) // 2, len(scans) // 3
+    first, whole = run(scans[:cut]), run(scans)
+    both = run(scans[begin:], first.document)
+    here = in_frame_of(first.trajectory.poses[0], both.trajectory.poses)
+    there = in_frame_of(whole.trajectory.poses[0], whole.trajectory.poses)[begin:]
+    metres, degrees = errors(here, there)
+    assert np.percentile(metres, 95) < 0.15
+    assert np.percentile(degrees, 95) < 1.5
+    assert length_m(both.document) == pytest.approx(length_m(whole.document), rel=0.05)
+    assert redundancy(both.document.finest) <= 1.05
