@@ -46,8 +46,8 @@ def run(
 
     \b
     Example:
-      bsmap diff map.bsm both.bsm
-      bsmap diff map.bsm both.bsm --at 0,0,0 --json
+      bsmap diff old.bsm map.bsm
+      bsmap diff old.bsm map.bsm --at 0,0,0 --json
     """
     from bsmap_cli.pipeline.two_maps import compare_maps
 

@@ -37,8 +37,8 @@ def run(
 
     \b
     Example:
-      bsmap merge map.bsm both.bsm -o merged.bsm
-      bsmap merge map.bsm both.bsm --at 0,0,0 -o merged.bsm
+      bsmap merge map.bsm old.bsm -o merged.bsm
+      bsmap merge map.bsm old.bsm --at 0,0,0 -o merged.bsm
     """
     from io import BytesIO
 
