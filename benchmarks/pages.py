@@ -36,7 +36,7 @@ def write_table(page: Path, name: str, table: str) -> None:
 
 def length(metres: float) -> str:
     """In millimetres or metres, whichever reads better."""
-    return f"{1e3 * metres:.1f} mm" if metres < 1.0 else f"{metres:.1f} m"
+    return f"{1e3 * metres:.3g} mm" if metres < 1.0 else f"{metres:.1f} m"
 
 
 def _line(cells: Iterable[object]) -> str:

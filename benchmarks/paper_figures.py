@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from paper_missions import LADDERS, NOISES_M, PROFILES, MissionRun
+from paper_missions import NOISES_M, PROFILES, MissionRun
 from paper_studies import ShapesRun
 from PIL import Image
 
@@ -23,6 +23,9 @@ from bsmap_cli.sensor.simulator.simulation import Simulation, simulate
 DPI, COLOURS = 90, 64
 POINTS = 250  # of a line: more only make the file larger
 TRUTH = {"colors": "#9aa5b1", "linewidths": 2.4}
+LINES = {"0.4": ("#d97706", "-"), "0.2": ("#2563eb", "-"), "0.1": ("#0f9f6e", "-")} | {
+    "ladder": ("#7c2d92", "--")
+}
 NAMES = {"0.4": "Δ 0.4 m", "0.2": "Δ 0.2 m", "0.1": "Δ 0.1 m", "ladder": "0.4, 0.2, 0.1 m"}
 
 
@@ -72,9 +75,9 @@ def draw_errors(runs: list[MissionRun], folder: Path) -> None:
         panels = figure.subplots(4, 2, sharex=True, sharey="row", squeeze=False)
         for run in (r for r in runs if r.mission == mission):
             column, row = NOISES_M.index(run.noise_m), 2 * PROFILES.index(run.profile)
-            colour = LIGHT.curves[list(LADDERS).index(run.ladder)]
+            colour, dashes = LINES[run.ladder]
             upper, lower = panels[row, column], panels[row + 1, column]
-            style = {"color": colour, "lw": 0.9, "label": NAMES[run.ladder]}
+            style = {"color": colour, "ls": dashes, "lw": 0.9, "label": NAMES[run.ladder]}
             shown = slice(1, None, max(1, len(run.seconds) // POINTS))
             upper.plot(run.seconds[shown], 1e3 * run.metres[shown], **style)
             lower.plot(run.seconds[shown], run.degrees[shown], **style)
