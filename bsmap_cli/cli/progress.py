@@ -96,6 +96,7 @@ class _Bar(_Plain):
         rate, pace = count / elapsed_s, span_s / elapsed_s
         figures = f"{count} scans  {rate:.0f} scans/s  {pace:.0f} x real time"
         self._bar.update(self._task, description="scans", completed=count, figures=figures)
+        self._bar.refresh()  # a short run shows them, too
 
     def stage(self, name: str) -> None:
         """Another task; after the scans of unknown length."""
