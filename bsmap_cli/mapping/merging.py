@@ -16,7 +16,7 @@ import numpy as np
 from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.mapping.curve_map import USABLE_WEIGHT, refresh_spans
+from bsmap_cli.mapping.curve_map import refresh_spans
 from bsmap_cli.mapping.fitting import (
     fit_control_points,
     fit_rms,
@@ -27,6 +27,7 @@ from bsmap_cli.mapping.span_index import remove_span
 from bsmap_cli.mapping.table_merge import merge_by_table
 from bsmap_cli.settings import setting
 
+KNOWN_WEIGHT = 0.25  # of a control point whose place says where the curve runs
 LEAST_WEIGHT = 1e-3  # of a control point that only the tip of its basis function has seen
 
 
@@ -220,7 +221,7 @@ def merge_run(
         for i in range(count):
             row = shift + i
             inside = level.offset[curve] <= row < level.offset[curve] + level.count[curve]
-            if inside and level.weights[row] >= USABLE_WEIGHT:
+            if inside and level.weights[row] >= KNOWN_WEIGHT:
                 known[i] = level.points[row]
                 is_known[i] = 1.0
     fitted, omega = np.empty((count, 2)), np.empty(count)
