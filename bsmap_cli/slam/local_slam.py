@@ -73,7 +73,7 @@ class LocalSlam:
             return Tracked(
                 self._pose, self._insert(scan_index, clusters, None, False), False, False
             )
-        prediction = self._predictor.predict(pose_odom_base)
+        prediction = self._predictor.predict(pose_odom_base, self._cadence.elapsed_s)
         blind = stretch if pose_odom_base is None else 1.0
         result = match_scan(
             self.older,

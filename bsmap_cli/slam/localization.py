@@ -98,7 +98,7 @@ class Localizer:
     def _follow(self, scan: Scan, clusters: list[Clusters]) -> None:
         """Track against the map; where that fails for some scans, seek again."""
         stretch = self._cadence.observe(scan.stamp_ns)
-        prediction = self._predictor.predict(scan.pose_odom_base)
+        prediction = self._predictor.predict(scan.pose_odom_base, self._cadence.elapsed_s)
         result = match_scan(
             self._map,
             clusters,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.ladder import track_down
@@ -16,6 +18,7 @@ from bsmap_cli.slam.submap import Submap
 if TYPE_CHECKING:
     from bsmap_cli.slam.slam_settings import SlamSettings
 
+ASTRAY_RAD = 0.05  # angles searched where only the way along a corridor is in doubt
 FEWEST_POINTS = 10  # a scan with fewer says nothing about being lost
 
 
@@ -35,6 +38,11 @@ def match_scan(
     blind : usual scan times that passed without odometry; in a gap the robot may have gone
     anywhere near, and even a fair match may be of another place. growing : the map ends where the
     robot has been, and not where the walls do.
+
+    A corridor holds its few features out of reach as soon as the robot starts, stops or turns
+    otherwise than predicted: what is left then looks bare, and the prediction is kept. Where
+    points find no wall while one direction is unobserved and no wheels speak, a search looks
+    along the corridor; only what shows the way in all directions is believed.
     """
     predicted = (last @ prediction.step).as_array()
     information = prediction.information()
@@ -50,21 +58,31 @@ def match_scan(
     recovery = settings.recovery
     gap = blind > recovery.gap
     fair = result.inlier_ratio >= recovery.search_below
-    if (fair and not gap) or result.points < FEWEST_POINTS:
+    adrift = result.degenerate > 0 and not prediction.by_odometry
+    unexplained = (1.0 - result.inlier_ratio) * result.points
+    astray = adrift and unexplained >= settings.segmentation.min_points
+    if (fair and not gap and not astray) or result.points < FEWEST_POINTS:
         return result
     wider = min(blind, recovery.widest) if gap else 1.0
     reach_m = recovery.reach * settings.ladder[-1] * wider
+    believed = information if growing and prediction.by_odometry else None
+    if not prediction.by_odometry and (gap or astray):
+        believed = np.diag([(0.5 * reach_m) ** -2.0] * 2 + [0.0])
+    reach_rad = math.radians(min(180.0, recovery.reach_deg * wider))
     way = math.hypot(prediction.step.x, prediction.step.y)
     guesses = [(predicted, reach_m + 0.5 * way), (last.as_array(), reach_m + way)]
+    if fair and not gap:  # the walls that are seen hold the heading
+        guesses, reach_rad = guesses[:1], ASTRAY_RAD
     return recover(
         submap,
         clusters,
         guesses,
         result,
         information,
-        reach_rad=math.radians(min(180.0, recovery.reach_deg * wider)),
+        reach_rad=reach_rad,
         sigma_m=sigma_m,
-        odometry=predicted if growing and prediction.by_odometry else None,
+        surely=adrift,
+        believed=believed,
         recovery=recovery,
         registration=settings.registration,
     )

@@ -11,6 +11,8 @@ from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.settings import setting
 
 MEMORY = 0.05  # share of the newest surprise
+CRUISE = 0.25  # share of the newest step in the velocity that is kept where walls say nothing
+LONGEST_S = 0.5  # no robot gathers speed for longer
 ODOMETRY_DRIFT = 0.1  # of the way: what raw odometry slips at its worst
 
 
@@ -37,6 +39,12 @@ class PredictionSettings:
     )
     motion_margin: float = setting(
         3.0, "times the deviation seen of late: motion changes suddenly", minimum=1.0
+    )
+    acceleration_m_s2: float = setting(
+        1.0, "without odometry: the robot may start or stop as hard at any scan", minimum=0.0
+    )
+    acceleration_deg_s2: float = setting(
+        120.0, "without odometry: and begin or end a turn as hard", minimum=0.0
     )
 
 
@@ -68,10 +76,12 @@ class Predictor:
         self.unit_m = finest_step_m
         self._odometry: SE2 | None = None
         self.last_step = SE2.identity()
+        self._cruise_m = np.zeros(2)
+        self._steps = -1  # the first pose is no step
         self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
         self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
 
-    def predict(self, pose_odom_base: SE2 | None) -> Prediction:
+    def predict(self, pose_odom_base: SE2 | None, elapsed_s: float) -> Prediction:
         """The step from the last scan to this one; `observe` must follow."""
         settings = self.settings
         if pose_odom_base is not None and self._odometry is not None:
@@ -84,10 +94,13 @@ class Predictor:
                 ODOMETRY_DRIFT * way,
                 True,
             )
-        sigma_m = settings.motion_margin * self._spread_m
-        return Prediction(
-            self.last_step, sigma_m, settings.motion_margin * self._spread_rad, sigma_m, False
+        square_s2 = min(elapsed_s, LONGEST_S) ** 2
+        started_rad = math.radians(settings.acceleration_deg_s2) * square_s2
+        sigma_m = max(
+            settings.motion_margin * self._spread_m, settings.acceleration_m_s2 * square_s2
         )
+        sigma_rad = max(settings.motion_margin * self._spread_rad, started_rad)
+        return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, False)
 
     def observe(self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool) -> None:
         """Tell what the step turned out to be, and whether the walls said so in all directions."""
@@ -99,7 +112,12 @@ class Predictor:
             squared = 0.5 * (surprise.x**2 + surprise.y**2)
             self._spread_m = max(floor_m, _faded(self._spread_m, squared))
             self._spread_rad = max(floor_rad, _faded(self._spread_rad, surprise.theta**2))
-        self.last_step = step
+            self.last_step = step
+        self._steps += 1
+        share = max(CRUISE, 1.0 / max(self._steps, 1))  # a log may begin on the way
+        self._cruise_m += share * (np.array([step.x, step.y]) - self._cruise_m)
+        if not measured:  # what no wall says must not grow out of the noise of one step
+            self.last_step = SE2(float(self._cruise_m[0]), float(self._cruise_m[1]), step.theta)
         self._odometry = pose_odom_base
 
 
@@ -112,16 +130,19 @@ class Cadence:
     """How long the scans usually lie apart, to know a gap in the log when one comes."""
 
     def __init__(self) -> None:
+        self.elapsed_s = 0.0
         self._usual_ns = 0.0
         self._last_ns: int | None = None
 
     def observe(self, stamp_ns: int) -> float:
         """Time since the last scan, in usual times; 1 where stamps repeat or step back.
 
-        The usual time is a mean that forgets; one gap hardly moves it.
+        The usual time is a mean that forgets; one gap hardly moves it. `elapsed_s` tells the same
+        in seconds.
         """
         elapsed = 0.0 if self._last_ns is None else float(stamp_ns - self._last_ns)
         self._last_ns = stamp_ns
+        self.elapsed_s = 1e-9 * (elapsed if elapsed > 0.0 else self._usual_ns)
         if elapsed <= 0.0:
             return 1.0
         if self._usual_ns == 0.0:

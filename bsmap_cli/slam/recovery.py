@@ -58,7 +58,8 @@ def recover(
     *,
     reach_rad: float,
     sigma_m: float,
-    odometry: Vector | None,
+    surely: bool,
+    believed: Points | None,
     recovery: RecoverySettings,
     registration: RegistrationSettings,
 ) -> RegistrationResult:
@@ -66,9 +67,11 @@ def recover(
 
     Odometry has jumps of its own and the last pose knows nothing of a gap in the log: both are
     guesses. What is found is refined without a prior, as the guess it came from may be far off.
-    odometry : where the wheels put the robot, for a map that grows with it. The farther a robot
-    drives between two scans, the better the second fits where the first was taken, since there the
-    map is: what contradicts the wheels must fit better by more.
+    surely : nothing is believed that leaves a direction unobserved.
+    believed : (3, 3) information of the prediction, the first guess, where it is worth anything.
+    What contradicts it must fit better by more: the farther a robot drives between two scans, the
+    better the second fits where the first was taken, since there the map is; and after a gap many
+    a place looks fairly like the right one.
     """
     cell_m = CELL_STEPS * submap.levels[-1].knot_step_m
     likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
@@ -89,17 +92,17 @@ def recover(
             settings=registration,
         )
         gain = recovery.gain
-        if odometry is not None:
-            if found.degenerate:
-                continue
-            gain += recovery.odometry_gain * _contradiction(found.pose, odometry, prior_information)
+        if found.degenerate and (surely or believed is not None):
+            continue
+        if believed is not None:
+            gain += recovery.odometry_gain * _contradiction(found.pose, guesses[0][0], believed)
         if found.inlier_ratio > best.inlier_ratio + gain:
             best = found
     return best
 
 
-def _contradiction(pose: Vector, odometry: Vector, information: Points) -> float:
-    """How many deviations a pose lies off the odometry; more than two mean as much as two."""
-    x, y, turn = pose - odometry
+def _contradiction(pose: Vector, predicted: Vector, information: Points) -> float:
+    """How many deviations a pose lies off the prediction; more than two mean as much as two."""
+    x, y, turn = pose - predicted
     off = np.array([x, y, wrap_angle(turn)])
     return min(2.0, math.sqrt(float(off @ information @ off)))
