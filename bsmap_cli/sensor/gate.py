@@ -14,6 +14,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.sensor.scan import Ranges, Scan
 from bsmap_cli.settings import setting
 
+FARTHEST_STEPS = 300.0  # [finest knot steps]: farther away, beams lie too far apart for curves
 NO_RETURN_SHARE = 0.995  # of range_max: "a hair less" is a code for no return, too
 
 
@@ -24,7 +25,7 @@ class SensorSettings:
     range_min_m: float = setting(0.0, "shorter ranges are not returns", minimum=0.0)
     range_max_m: float | None = setting(
         None,
-        "longer ranges are not returns; null: the log's limit, else 300 finest knot steps",
+        "longer ranges are not used; null: the log's limit, and at most 300 finest knot steps",
         minimum=0.0,
     )
     range_sigma_m: float | None = setting(
@@ -123,9 +124,8 @@ def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tu
     """Shortest and longest range [m] that counts as a return of this scan."""
     far = scan.range_max_m * NO_RETURN_SHARE
     if not 0.0 < far < math.inf:
-        far = math.inf if settings.range_max_m else 300.0 * knot_step_m
-    if settings.range_max_m:
-        far = min(far, settings.range_max_m)
+        far = math.inf
+    far = min(far, settings.range_max_m or FARTHEST_STEPS * knot_step_m)
     near = max(scan.range_min_m, settings.range_min_m, 1e-3 * knot_step_m)
     return near, far
 

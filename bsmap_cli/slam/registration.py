@@ -11,27 +11,20 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel, lean
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.kernels import (
-    foot_point,
-    polynomial_jet,
     solve3,
 )
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.mapping.association import END_TOLERANCE, MIN_COSINE, usable_rows
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.mapping.span_index import nearest_span
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
+from bsmap_cli.slam.point_equations import accumulate
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
-TANGENT_NOISE = (
-    0.2  # variance of a curve's tangent, per variance of a point over Delta^2 and weight
-)
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; the next would be its square
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
@@ -89,129 +82,6 @@ class RegistrationResult:
     points: int
 
 
-@inlined
-def _match(
-    level: LevelArrays,
-    matrix: Points,
-    knot_step_m: float,
-    row: int,
-    f: float,
-    steps: int,
-    px: float,
-    py: float,
-    tx: float,
-    ty: float,
-    polynomial: Points,
-) -> tuple[bool, int, float, float, float, float]:
-    """Foot point near f on span `row`: found or not, row, f, residual [m] and unit tangent there.
-
-    The residual is that along the normal (-uy, ux).
-    """
-    first_row, last_row = usable_rows(level, level.owner[row], matrix.shape[0] - 1)
-    row, f = foot_point(
-        level.points, matrix, row, f, first_row, last_row, px, py, steps, polynomial
-    )
-    x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
-    ex, ey = px - x, py - y
-    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + 1e-300)
-    ux, uy = dx * inverse, dy * inverse
-    found = (
-        abs(ex * ux + ey * uy) <= END_TOLERANCE * knot_step_m
-        and ux * tx + uy * ty >= MIN_COSINE
-        and level.span_cell[row] >= 0
-    )
-    return found, row, f, ey * ux - ex * uy, ux, uy
-
-
-@lean
-def _accumulate(  # noqa: PLR0915
-    level: LevelArrays,
-    matrix: Points,
-    knot_step_m: float,
-    points: Points,
-    tangents: Points,
-    variances: Vector,
-    pose: Vector,
-    gate_m: float,
-    kernel_m: float,
-    inlier_m: float,
-    rows: NDArray[np.int64],
-    places: Vector,
-    hessian: Points,
-    gradient: Vector,
-    tally: Vector,
-    polynomial: Points,
-) -> None:
-    """Sum the normal equations of all matched points.
-
-    A point goes on from its foot point of the last step; a new one from its neighbour's, and the
-    index is asked only where that curve is not plainly the right one.
-
-    tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
-    information that noisy tangents feign along a straight wall.
-    """
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
-    inliers = squares = lever = total = feigned = 0.0
-    f = residual = ux = uy = 0.0
-    neighbour = -1
-    for j in range(len(points)):
-        qx = cos * points[j, 0] - sin * points[j, 1]
-        qy = sin * points[j, 0] + cos * points[j, 1]
-        px, py = qx + pose[0], qy + pose[1]
-        tx = cos * tangents[j, 0] - sin * tangents[j, 1]
-        ty = sin * tangents[j, 0] + cos * tangents[j, 1]
-        found = False
-        row = rows[j]
-        if row >= 0:
-            found, row, f, residual, ux, uy = _match(
-                level, matrix, knot_step_m, row, places[j], 1, px, py, tx, ty, polynomial
-            )
-            found = found and abs(residual) <= gate_m
-        else:
-            if neighbour >= 0:
-                found, row, f, residual, ux, uy = _match(
-                    level, matrix, knot_step_m, neighbour, f, 2, px, py, tx, ty, polynomial
-                )
-                found = found and abs(residual) <= inlier_m
-            if not found:
-                row, f = nearest_span(level, knot_step_m, px, py, tx, ty, gate_m, MIN_COSINE)
-                if row >= 0:
-                    found, row, f, residual, ux, uy = _match(
-                        level, matrix, knot_step_m, row, f, 2, px, py, tx, ty, polynomial
-                    )
-                    found = found and abs(residual) <= gate_m
-        neighbour = rows[j] = row if found else -1
-        if not found:
-            continue
-        places[j] = f
-        ratio = residual / kernel_m
-        root = 1.0 + ratio * ratio
-        weight = 1.0 / (root * root * variances[j])
-        j2 = qx * ux + qy * uy  # normal . d(R p)/d theta
-        h00 += weight * uy * uy
-        h01 -= weight * uy * ux
-        h11 += weight * ux * ux
-        h02 -= weight * uy * j2
-        h12 += weight * ux * j2
-        h22 += weight * j2 * j2
-        g0 += weight * uy * residual
-        g1 -= weight * ux * residual
-        g2 -= weight * j2 * residual
-        lever += weight * (qx * qx + qy * qy)
-        total += weight
-        feigned += weight * TANGENT_NOISE * variances[j] / max(level.weights[row + 1], 0.1)
-        if abs(residual) <= inlier_m:
-            inliers += 1.0
-            squares += residual * residual
-    hessian[0, 0], hessian[0, 1], hessian[0, 2] = h00, h01, h02
-    hessian[1, 0], hessian[1, 1], hessian[1, 2] = h01, h11, h12
-    hessian[2, 0], hessian[2, 1], hessian[2, 2] = h02, h12, h22
-    gradient[0], gradient[1], gradient[2] = g0, g1, g2
-    tally[0], tally[1], tally[2], tally[3] = inliers, squares, lever, total
-    tally[4] = feigned / (knot_step_m * knot_step_m)
-
-
 @kernel
 def _register(
     level: LevelArrays,
@@ -239,7 +109,7 @@ def _register(
     found = 0
     steps = 0
     for _ in range(iterations):
-        _accumulate(
+        accumulate(
             level,
             matrix,
             knot_step_m,
