@@ -67,7 +67,7 @@ def recover(
 
     Odometry has jumps of its own and the last pose knows nothing of a gap in the log: both are
     guesses. What is found is refined without a prior, as the guess it came from may be far off.
-    surely : nothing is believed that leaves a direction unobserved.
+    surely : nothing is believed that leaves a direction unobserved, unless all else is lost.
     believed : (3, 3) information of the prediction, the first guess, where it is worth anything.
     What contradicts it must fit better by more: the farther a robot drives between two scans, the
     better the second fits where the first was taken, since there the map is; and after a gap many
@@ -76,6 +76,7 @@ def recover(
     cell_m = CELL_STEPS * submap.levels[-1].knot_step_m
     likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
     coarse = clusters[max(0, len(clusters) - 2)]
+    wary = (surely or believed is not None) and best.inlier_ratio >= recovery.lost_below
     for pose, reach_m in guesses:
         window = Window(pose, reach_m, reach_rad)
         peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.2)
@@ -92,7 +93,7 @@ def recover(
             settings=registration,
         )
         gain = recovery.gain
-        if found.degenerate and (surely or believed is not None):
+        if found.degenerate and wary:
             continue
         if believed is not None:
             gain += recovery.odometry_gain * _contradiction(found.pose, guesses[0][0], believed)
