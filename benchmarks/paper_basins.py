@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import process_time
 
@@ -72,7 +72,7 @@ def _aways(off: tuple[float, float]) -> list[Vector]:
     ]
 
 
-def _mapped(scene: str, lidar: str) -> tuple[Mapper, list[tuple[list[Clusters], Vector]]]:
+def _mapped(scene: str, lidar: str) -> tuple[Mapper, list[tuple[Sequence[Clusters], Vector]]]:
     """A map from true poses, and scans that are not in it."""
     simulation = simulate(scene, lidar=lidar, noise_m=NOISE_M, odometry=False)
     settings = load_settings("default")
@@ -91,7 +91,7 @@ def _mapped(scene: str, lidar: str) -> tuple[Mapper, list[tuple[list[Clusters], 
 
 def _register(
     mapper: Mapper,
-    clusters: list[Clusters],
+    clusters: Sequence[Clusters],
     start: Vector,
     off: tuple[float, float],
     settings: Settings,

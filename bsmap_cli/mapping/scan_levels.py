@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import overload
+
 from bsmap_cli.mapping.fitting import FittingSettings
 from bsmap_cli.mapping.segmentation import Clusters, SegmentationSettings, find_clusters
 from bsmap_cli.sensor.gate import Returns
 
 
-def coarser_levels(
-    finest: Clusters, ladder: tuple[float, ...], fitting: FittingSettings, sigma_m: float
-) -> list[Clusters]:
-    """Clusters for each knot step, coarse to fine, from those of the finest."""
-    levels = [finest]
-    for step in reversed(ladder[:-1]):
-        levels.append(levels[-1].coarser(step, fitting.thinning * step, sigma_m))
-    return levels[::-1]
+class ScanLevels(Sequence[Clusters]):
+    """Clusters for each knot step, coarse to fine; coarser ones are made when asked for.
+
+    A scan that is tracked at the finest level, and is no keyframe, never needs them.
+    """
+
+    def __init__(
+        self, finest: Clusters, ladder: Sequence[float], fitting: FittingSettings, sigma_m: float
+    ) -> None:
+        self._levels: list[Clusters | None] = [None] * (len(ladder) - 1) + [finest]
+        self._ladder, self._thinning, self._sigma_m = ladder, fitting.thinning, sigma_m
+
+    def __len__(self) -> int:
+        return len(self._levels)
+
+    @overload
+    def __getitem__(self, index: int) -> Clusters: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Clusters]: ...
+
+    def __getitem__(self, index: int | slice) -> Clusters | list[Clusters]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        k = range(len(self))[index]
+        level = self._levels[k]
+        if level is None:
+            step = self._ladder[k]
+            level = self[k + 1].coarser(step, self._thinning * step, self._sigma_m)
+            self._levels[k] = level
+        return level
 
 
 def scan_levels(
@@ -23,7 +49,7 @@ def scan_levels(
     segmentation: SegmentationSettings,
     fitting: FittingSettings,
     sigma_m: float,
-) -> list[Clusters]:
+) -> Sequence[Clusters]:
     """Segment at the finest knot step, eq. (3), and widen the bins for the coarser ones.
 
     With `segmentation.each_level` every knot step is segmented on its own, as in the paper.
@@ -41,4 +67,4 @@ def scan_levels(
     ]
     if segmentation.each_level:
         return found
-    return coarser_levels(found[0], ladder, fitting, sigma_m)
+    return ScanLevels(found[0], ladder, fitting, sigma_m)

@@ -11,7 +11,7 @@ from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapLevel
-from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.thaw import thaw_level
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
@@ -61,7 +61,7 @@ def build_map(
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
     for pose, keyframe in zip(poses, keyframes, strict=True):
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
-        clusters = coarser_levels(finest, ladder, settings.fitting, sigma_m)
+        clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
         for level, seen in zip(levels, clusters, strict=True):
             insert_clusters(level, seen, pose, settings)
     return levels
@@ -80,7 +80,7 @@ def refine_poses(
     prior = isotropic_information((0.3 * ladder[-1], 0.02))
     for k, keyframe in enumerate(keyframes):
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
-        clusters = coarser_levels(finest, ladder, settings.fitting, sigma_m)
+        clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
         result = register_down(
             levels,
             clusters,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bsmap_cli.geometry.se2 import SE2, Vector
@@ -31,7 +32,7 @@ class FrontEnd:
         """Deviation of the range noise [m]."""
         return self._noise.sigma_m
 
-    def clusters(self, scan: Scan, last_step: SE2) -> list[Clusters]:
+    def clusters(self, scan: Scan, last_step: SE2) -> Sequence[Clusters]:
         """Clusters of one scan, coarse to fine; `last_step` is the motion since the scan before."""
         settings = self._settings
         self._noise.observe(scan)

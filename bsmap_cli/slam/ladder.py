@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def register_down(
     levels: list[CurveMap],
-    clusters: list[Clusters],
+    clusters: Sequence[Clusters],
     start_pose: Vector,
     prior_pose: Vector,
     prior_information: Points,
@@ -37,7 +38,7 @@ def register_down(
 
 def track_down(
     levels: list[CurveMap],
-    clusters: list[Clusters],
+    clusters: Sequence[Clusters],
     start_pose: Vector,
     prior_pose: Vector,
     prior_information: Points,

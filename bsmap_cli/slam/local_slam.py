@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -62,7 +63,7 @@ class LocalSlam:
         self,
         scan_index: int,
         stamp_ns: int,
-        clusters: list[Clusters],
+        clusters: Sequence[Clusters],
         pose_odom_base: SE2 | None,
     ) -> Tracked:
         """Predict, register, recover and, on a keyframe, insert."""
@@ -114,7 +115,7 @@ class LocalSlam:
     def _insert(
         self,
         scan_index: int,
-        clusters: list[Clusters],
+        clusters: Sequence[Clusters],
         result: RegistrationResult | None,
         weak: bool,
     ) -> Keyframe:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.map_document import MapDocument
-from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
@@ -95,7 +96,7 @@ class Localizer:
         stamps = np.array(self._stamps_ns, np.int64)
         return Localized(Trajectory(stamps, poses), self._converged, self._lost_scans)
 
-    def _follow(self, scan: Scan, clusters: list[Clusters]) -> None:
+    def _follow(self, scan: Scan, clusters: Sequence[Clusters]) -> None:
         """Track against the map; where that fails for some scans, seek again."""
         stretch = self._cadence.observe(scan.stamp_ns)
         prediction = self._predictor.predict(scan.pose_odom_base, self._cadence.elapsed_s)
@@ -157,7 +158,7 @@ class Localizer:
         self._next_search = FEWEST_AT_FIRST if self._converged is None else 1
         self._candidate: tuple[SE2, SE2] | None = None
 
-    def _seek(self, local: LocalSlam, scan: Scan, clusters: list[Clusters]) -> None:
+    def _seek(self, local: LocalSlam, scan: Scan, clusters: Sequence[Clusters]) -> None:
         """Go on with the small map; search the old one for it whenever it has grown."""
         self._cadence.observe(scan.stamp_ns)
         local.sigma_m = self._front.sigma_m
@@ -218,7 +219,7 @@ class Localizer:
         start = (pose_map_local @ keyframe.pose_local).as_array()
         result = register_down(
             self._map.levels,
-            coarser_levels(finest, settings.ladder, settings.fitting, sigma_m),
+            ScanLevels(finest, settings.ladder, settings.fitting, sigma_m),
             start,
             start,
             isotropic_information((2.0 * unit, 0.1)),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
-from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.correlative import Window, search
@@ -23,6 +24,7 @@ from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
+AGREED_STEPS = 2.0  # two closures from far off may contradict one another by so much
 URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
 
 
@@ -84,7 +86,7 @@ class LoopCloser:
             return
         finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.local.sigma_m)
         settings = self.local.settings
-        clusters = coarser_levels(finest, settings.ladder, settings.fitting, self.local.sigma_m)
+        clusters = ScanLevels(finest, settings.ladder, settings.fitting, self.local.sigma_m)
         for submap, reach_m, reach_rad in candidates[: settings.loops.tries]:
             self._try(keyframe, clusters, submap, reach_m, reach_rad)
 
@@ -101,8 +103,7 @@ class LoopCloser:
         self._remember(count)
         metres, radians = self.graph.deviations_from(keyframe.submap)
         here = self._pose_map(keyframe)
-        points = keyframe.clusters.points
-        view_m = float(np.median(np.hypot(points[:, 0], points[:, 1]))) if len(points) else 0.0
+        view_m = _view_m(keyframe)
         reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
         away = np.hypot(*(self.graph.poses[:count, :2] - (here.x, here.y)).T)
         near = away <= self._extents_m[:count] + view_m + reach_m
@@ -130,7 +131,7 @@ class LoopCloser:
     def _try(
         self,
         keyframe: Keyframe,
-        clusters: list[Clusters],
+        clusters: Sequence[Clusters],
         submap: Submap,
         reach_m: float,
         reach_rad: float,
@@ -209,8 +210,14 @@ class LoopCloser:
         )
 
     def _confirm(self, loop: Loop, keyframe: Keyframe) -> None:
-        """Two closures agree when both ask for the same correction of the present place."""
+        """Two closures agree when both ask for the same correction of the present place.
+
+        That is evidence only where each could have asked for another one: both must know the
+        place in all directions, and the second not see again what misled the first.
+        """
         unit = self.local.settings.ladder[-1]
+        if _position_deviation(loop.information) > AGREED_STEPS * unit:
+            return
         wanted = self.graph.pose(loop.submap) @ loop.pose_submap_base
         for other, other_wanted in self._doubtful:
             if other.keyframe == loop.keyframe:
@@ -221,9 +228,9 @@ class LoopCloser:
             gap = tracked.inverse() @ asked
             way = math.hypot(tracked.x, tracked.y)
             if (
-                math.hypot(gap.x, gap.y) < 2.0 * unit + 0.05 * way
+                math.hypot(gap.x, gap.y) < AGREED_STEPS * unit + 0.05 * way
                 and abs(gap.theta) < math.radians(3.0)
-                and way < 100.0 * unit
+                and _view_m(keyframe) <= way < 100.0 * unit
             ):
                 self._doubtful.remove((other, other_wanted))
                 self._accept(other)
@@ -231,3 +238,15 @@ class LoopCloser:
                 return
         self._doubtful.append((loop, wanted))
         del self._doubtful[:-50]
+
+
+def _view_m(keyframe: Keyframe) -> float:
+    """Half of what a keyframe sees lies farther away [m]."""
+    points = keyframe.clusters.points
+    return float(np.median(np.hypot(points[:, 0], points[:, 1]))) if len(points) else 0.0
+
+
+def _position_deviation(information: Points) -> float:
+    """Of a pose [m], along the direction in which it is known the least."""
+    covariance = np.linalg.inv(information)[:2, :2]
+    return math.sqrt(float(np.linalg.eigvalsh(covariance)[-1]))

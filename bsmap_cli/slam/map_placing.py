@@ -19,7 +19,7 @@ from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.map_document import LevelSamples, MapDocument
 from bsmap_cli.mapping.resampling import one_level
 from bsmap_cli.mapping.sampling import sample_level
-from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.correlative import Window, search
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap, settings_for_map
@@ -88,7 +88,7 @@ class MapPlacer:
         x, y = (0.5 * (low + high)).tolist()
         self._pose_b_middle = SE2(x, y, 0.0)
         self._samples = replace(self._samples, points=self._samples.points - [x, y])
-        self._clusters = coarser_levels(
+        self._clusters = ScanLevels(
             _as_clusters(self._samples),
             self._settings.ladder,
             self._settings.fitting,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ FEWEST_POINTS = 10  # a scan with fewer says nothing about being lost
 
 def match_scan(
     submap: Submap,
-    clusters: list[Clusters],
+    clusters: Sequence[Clusters],
     last: SE2,
     prediction: Prediction,
     *,

@@ -9,7 +9,7 @@ import numpy as np
 
 from bsmap_cli.errors import TrackingError
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
-from bsmap_cli.mapping.scan_levels import coarser_levels
+from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.visibility import HIT, MISS, look_at
 from bsmap_cli.slam.correlative import Peak, Window, search
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap
@@ -129,7 +129,7 @@ class PlaceFinder:
         finest = self._local.keyframes[k].clusters.unpack(self._unit, sigma_m)
         return register_down(
             self._known.levels,
-            coarser_levels(finest, settings.ladder, settings.fitting, sigma_m),
+            ScanLevels(finest, settings.ladder, settings.fitting, sigma_m),
             start,
             start,
             isotropic_information((0.5 * DIRECT_STEPS * self._unit, 0.1)),

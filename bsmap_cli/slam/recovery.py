@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ class RecoverySettings:
 
 def recover(
     submap: Submap,
-    clusters: list[Clusters],
+    clusters: Sequence[Clusters],
     guesses: list[tuple[Vector, float]],
     best: RegistrationResult,
     prior_information: Points,

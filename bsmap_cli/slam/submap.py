@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bsmap_cli.geometry.se2 import SE2
@@ -46,7 +47,7 @@ class Submap:
         """A pose of the local frame, in the submap's."""
         return self.pose_local.inverse() @ pose_local
 
-    def insert(self, keyframe: int, clusters: list[Clusters], pose_submap_base: SE2) -> None:
+    def insert(self, keyframe: int, clusters: Sequence[Clusters], pose_submap_base: SE2) -> None:
         """Let a keyframe change the curves."""
         pose = pose_submap_base.as_array()
         for level, seen in zip(self.levels, clusters, strict=True):
