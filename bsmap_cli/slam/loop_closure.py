@@ -23,6 +23,7 @@ from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
+DRAWN = 24  # likelihoods of submaps that are kept for the next search
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
 AGREED_STEPS = 2.0  # two closures from far off may contradict one another by so much
 URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
@@ -70,6 +71,7 @@ class LoopCloser:
     tried: int = 0
     _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
     _next_try: Vector = field(default_factory=lambda: np.empty(0))
+    _drawn: dict[int, Submap] = field(default_factory=dict)
     _viewpoints: list[Points] = field(default_factory=list)
     _extents_m: Vector = field(default_factory=lambda: np.empty(0))
     _travelled_m: float = 0.0
@@ -145,6 +147,7 @@ class LoopCloser:
         far = reach_m > DIRECT_STEPS * unit
         if far:
             likelihood = submap.likelihood(cell_m=CELL_STEPS * unit, heights=HEIGHTS)
+            self._keep_drawn(submap)
             coarse = clusters[max(0, len(clusters) - 2)]
             window = Window(guess, reach_m, reach_rad)
             peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.4)
@@ -185,6 +188,13 @@ class LoopCloser:
         else:
             self._accept(loop)
         self._next_try[submap.index] = self._travelled_m + 3.0 * settings.loops.retry * unit
+
+    def _keep_drawn(self, submap: Submap) -> None:
+        """Likelihoods take far more memory than curves: keep those that were asked for last."""
+        self._drawn.pop(submap.index, None)
+        self._drawn[submap.index] = submap
+        if len(self._drawn) > DRAWN:
+            self._drawn.pop(next(iter(self._drawn))).forget_likelihood()
 
     def _good(self, result: RegistrationResult, unit_m: float) -> bool:
         settings = self.local.settings.loops
