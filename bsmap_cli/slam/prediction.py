@@ -65,7 +65,10 @@ class Prediction:
 
     def information(self) -> Points:
         """(3, 3) inverse covariance; the same in every frame, as translation has no direction."""
-        return np.diag([self.sigma_m**-2.0, self.sigma_m**-2.0, self.sigma_rad**-2.0])
+        information = np.zeros((3, 3))
+        information[0, 0] = information[1, 1] = self.sigma_m**-2.0
+        information[2, 2] = self.sigma_rad**-2.0
+        return information
 
 
 class Predictor:
@@ -76,7 +79,7 @@ class Predictor:
         self.unit_m = finest_step_m
         self._odometry: SE2 | None = None
         self.last_step = SE2.identity()
-        self._cruise_m = np.zeros(2)
+        self._cruise_m = (0.0, 0.0)
         self._steps = -1  # the first pose is no step
         self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
         self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
@@ -115,9 +118,10 @@ class Predictor:
             self.last_step = step
         self._steps += 1
         share = max(CRUISE, 1.0 / max(self._steps, 1))  # a log may begin on the way
-        self._cruise_m += share * (np.array([step.x, step.y]) - self._cruise_m)
+        x, y = self._cruise_m
+        self._cruise_m = (x + share * (step.x - x), y + share * (step.y - y))
         if not measured:  # what no wall says must not grow out of the noise of one step
-            self.last_step = SE2(float(self._cruise_m[0]), float(self._cruise_m[1]), step.theta)
+            self.last_step = SE2(*self._cruise_m, step.theta)
         self._odometry = pose_odom_base
 
 

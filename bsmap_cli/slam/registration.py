@@ -89,7 +89,8 @@ def _register(
     knot_step_m: float,
     points: Points,
     tangents: Points,
-    variances: Vector,
+    counts: Vector,
+    sigma_m: float,
     pose: Vector,
     prior_pose: Vector,
     prior_information: Points,
@@ -102,7 +103,9 @@ def _register(
     tally: Vector,
 ) -> tuple[int, int]:
     """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
-    rows, places = np.full(len(points), -1), np.empty(len(points))
+    rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
+    for j in range(len(points)):
+        variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
     gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
     start = pose.copy()
@@ -170,14 +173,14 @@ def register(
     """
     step = curve_map.knot_step_m
     pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(5)
-    variances = SHARED * (sigma_m**2 / clusters.counts + (MODEL_ERROR * step) ** 2)
     steps, degenerate = _register(
         curve_map.arrays,
         curve_map.matrix,
         step,
         clusters.points,
         clusters.tangents,
-        variances,
+        clusters.counts,
+        sigma_m,
         pose,
         prior_pose,
         prior_information,
