@@ -12,6 +12,7 @@ from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import sample_level
 
 SAMPLES_PER_STEP = 4
+MOST_PAIRS = 5e6  # that are looked at together: some hundred megabytes
 REACH = 0.5  # [knot steps] between a sample and the curve that covers it
 APART = 2.0  # [knot steps] in tau from which on a curve may cover itself
 COS_TURN = math.cos(math.radians(30.0))
@@ -42,7 +43,28 @@ def covered_samples(
     first = np.flatnonzero(np.diff(samples.piece) == 0)  # segments between neighbouring samples
     chord = samples.points[first + 1] - samples.points[first]
     length = np.hypot(chord[:, 0], chord[:, 1])
-    sample, segment = _meetings(samples, first, chord, length, knot_step_m)
+    middles, segment = _parts(samples, first, chord, length, knot_step_m)
+    reach_m = REACH * knot_step_m + 0.51 * knot_step_m / SAMPLES_PER_STEP
+    covered = np.zeros(len(samples.tau_m), bool)
+    blocks = math.ceil(_crowd(samples.points, middles, reach_m) / MOST_PAIRS)
+    for rows in np.array_split(np.arange(len(covered)), max(blocks, 1)):
+        near, part = near_pairs(samples.points[rows], middles, reach_m)
+        pairs = rows[near], segment[part]
+        covered[_covered(samples, curve_ids, knot_step_m, first, chord, length, pairs)] = True
+    return covered
+
+
+def _covered(
+    samples: LevelSamples,
+    curve_ids: NDArray[np.int64],
+    knot_step_m: float,
+    first: NDArray[np.int64],
+    chord: Points,
+    length: Vector,
+    pairs: Pairs,
+) -> NDArray[np.int64]:
+    """The samples among pairs of samples and segments that are covered by their segment."""
+    sample, segment = pairs
     weight, ids = samples.weight, curve_ids[samples.curve]
 
     # cheap conditions first: each leaves fewer pairs to the next
@@ -63,27 +85,30 @@ def covered_samples(
     off = offset - f[:, None] * way
     there = weight[other] + f * (weight[other + 1] - weight[other])
     heavier = (there > weight[sample]) | ((there == weight[sample]) & (ids[other] < ids[sample]))
-    covered = np.zeros(len(samples.tau_m), bool)
-    covered[sample[heavier & (np.hypot(off[:, 0], off[:, 1]) <= REACH * knot_step_m)]] = True
-    return covered
+    return np.asarray(sample[heavier & (np.hypot(off[:, 0], off[:, 1]) <= REACH * knot_step_m)])
 
 
-def _meetings(
+def _crowd(points: Points, others: Points, reach_m: float) -> float:
+    """About how many pairs lie within reach: what a map drawn many times over must not hold."""
+    cell = np.floor(others / reach_m).astype(np.int64)
+    _, count = np.unique(cell[:, 0] * (1 << 31) + cell[:, 1], return_counts=True)
+    return 9.0 * len(points) * float((count**2).sum()) / max(len(others), 1)
+
+
+def _parts(
     samples: LevelSamples,
     first: NDArray[np.int64],
     chord: Points,
     length: Vector,
     knot_step_m: float,
-) -> Pairs:
-    """Samples and segments that may be within reach; segments that are long meet in parts."""
+) -> tuple[Points, NDArray[np.int64]]:
+    """Middles of all segments, and their numbers; segments that are long count in parts."""
     part_m = knot_step_m / SAMPLES_PER_STEP
     parts = np.maximum(np.ceil(length / part_m - 1e-6), 1).astype(np.int64)
     segment = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(segment)) - np.repeat(np.cumsum(parts) - parts, parts)
     share = (number + 0.5) / parts[segment]
-    middles = samples.points[first[segment]] + share[:, None] * chord[segment]
-    sample, part = near_pairs(samples.points, middles, REACH * knot_step_m + 0.51 * part_m)
-    return sample, segment[part]
+    return samples.points[first[segment]] + share[:, None] * chord[segment], segment
 
 
 def near_pairs(points: Points, others: Points, reach_m: float) -> Pairs:
