@@ -1,83 +1,90 @@
-"""One stage changed or switched off at a time, by settings alone."""
+"""What each stage of `slam` buys: one of them changed or switched off at a time, by settings.
+
+python benchmarks/ablation.py FOLDER_OR_LOG... [--write docs/slam.md]
+
+A log is judged by what lies beside it: NAME.relations or NAME.truth.tum. Two simulated scenes,
+judged by their truth, come with them.
+"""
 
 from __future__ import annotations
 
-from fnmatch import fnmatch
+import argparse
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+import fresh_kernels  # noqa: F401  (before numba)
 from cases import Case, logs_in, recorded_case, simulated_case
 from judging import Judged, judge
+from pages import markdown, write_table
 
 from bsmap_cli.config import load_settings
 
+NO_ODOMETRY = "odometry left out"
 CHANGES: dict[str, tuple[str, ...]] = {
     "as built": (),
+    NO_ODOMETRY: (),
+    "no prior from odometry": (
+        "prediction.odometry_sigma=1e3",
+        "prediction.odometry_sigma_deg=180",
+    ),
     "one level, 0.1 m": ("ladder=[0.1]",),
     "one level, 0.2 m": ("ladder=[0.2]",),
-    "levels 0.8/0.4/0.2": ("ladder=[0.8,0.4,0.2]",),
-    "each level segmented anew": ("segmentation.each_level=true",),
-    "constant longest gap, eq. (3)": ("segmentation.beam_gap=false",),
+    "no shortcut to the finest level": ("registration.shortcut=2",),
+    "no test for unobserved directions": ("registration.degenerate=0",),
+    "curves to curves on the coarsest level": ("registration.method=joint_first",),
     "no thinning": ("fitting.thinning=0",),
     "no fit penalty": ("fitting.penalty=0", "fitting.first_penalty=0"),
+    "chord length instead of arc length": ("fitting.parameters=chord",),
     "merging by Table I": ("merging.method=table",),
-    "no weight cap (255)": ("merging.max_weight=255",),
-    "curves jointly on the coarsest": ("registration.method=joint_first",),
-    "curves jointly on all levels": ("registration.method=joint",),
-    "no degeneracy test": ("registration.degenerate=0",),
-    "wide kernel": ("registration.kernel=100",),
-    "no recovery search": ("recovery.search_below=0",),
-    "no wider search after gaps": ("recovery.widest=1",),
-    "fixed motion prior": ("prediction.motion_floor=0.3",),
     "every scan a keyframe": ("keyframes.distance=0",),
-    "submaps of 20": ("submaps.keyframes=20",),
-    "submaps of 80": ("submaps.keyframes=80",),
+    "no recovery": ("recovery.search_below=0", "recovery.lost_below=0"),
     "no loop closure": ("loops.enabled=false",),
     "no final rounds": ("final_map.rounds=0",),
-    "one final round": ("final_map.rounds=1",),
-    "final rounds on the finest level": ("final_map.levels=1",),
     "the map as tracking built it": ("final_map.rebuild=false",),
+    "what moves stays in the map": ("visibility.method=off",),
 }
-SIMULATED = (
-    ("loop", "lms200", True, ""),
-    ("loop", "ust10lx", False, ""),
-    ("office", "urg04lx", False, ""),
-    ("hallway", "lms200", False, ""),
-    ("loop", "lms200", True, "gap"),
-)
+SIMULATED = (("loop", "lms200"), ("hallway", "lms200"))
 
 
-def _cases(logs: list[Path], only: list[str] | None) -> list[Case]:
-    cases = [recorded_case(path, odometry=on) for path in logs_in(logs) for on in (True, False)]
-    cases += [
-        simulated_case(scene, lidar, odometry=odometry, variant=variant)
-        for scene, lidar, odometry, variant in SIMULATED
-    ]
-    return [c for c in cases if not only or any(fnmatch(c.name, pattern) for pattern in only)]
+def main() -> None:
+    """Print the table, a line as soon as it is known, and put it on a page."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("logs", nargs="*", type=Path, help="logs, or folders of them")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="also put it on this page")
+    arguments = parser.parse_args()
+    with_wheels, without = (cases(arguments.logs, odometry=on) for on in (True, False))
+    names = [case.name.removesuffix("/odom") for case in with_wheels]
+    judge(with_wheels[-1], load_settings())  # what is compiled now does not count below
+    heading = ("changed", *names, "redundancy", "control points", "seconds")
+    table = markdown(heading, rows(with_wheels, without))
+    if arguments.write:
+        write_table(arguments.write, "ablation", table)
 
 
-def _figure(row: Judged) -> str:
-    """Mean +- deviation of the relations [cm], or the ATE; a cross for each time it was lost."""
-    text = f"{100 * row.ate_m:.2f}" if row.ate_m is not None else ""
-    if row.relation_m is not None and row.relation_std_m is not None:
-        text = f"{100 * row.relation_m:.2f}+-{100 * row.relation_std_m:.2f}"
-    return text + "x" * min(row.lost, 3)
+def cases(logs: list[Path], *, odometry: bool) -> list[Case]:
+    """The columns."""
+    found = [recorded_case(path, odometry=odometry) for path in logs_in(logs)]
+    return found + [simulated_case(scene, lidar, odometry=odometry) for scene, lidar in SIMULATED]
 
 
-def print_ablation(
-    logs: list[Path], only: list[str] | None, overrides: list[str]
-) -> list[dict[str, Any]]:
-    """A line for each change, a column for each case, then redundancy and seconds in all."""
-    cases = _cases(logs, only)
-    print("ATE rmse, or error of the relations +- deviation [cm]; x: tracking lost")
-    print(f"{'change':<34}" + "".join(f"{case.name:>26}" for case in cases), end="")
-    print(f"{'redundancy':>12}{'seconds':>9}", flush=True)
-    rows = []
+def rows(with_wheels: list[Case], without: list[Case]) -> Iterator[tuple[object, ...]]:
+    """A line for each change: the error on each log, then sums over all."""
     for name, change in CHANGES.items():
-        settings = load_settings(overrides=[*overrides, *change])
-        judged = [judge(case, settings) for case in cases]
-        rows += [{"change": name, "settings": list(change), **row.as_json()} for row in judged]
-        print(f"{name:<34}" + "".join(f"{_figure(row):>26}" for row in judged), end="")
-        mean = sum(row.redundancy for row in judged) / len(judged)
-        print(f"{mean:>12.3f}{sum(row.seconds for row in judged):>9.1f}", flush=True)
-    return rows
+        settings = load_settings(overrides=change)
+        judged = [judge(c, settings) for c in (without if name == NO_ODOMETRY else with_wheels)]
+        redundancy = sum(row.redundancy for row in judged) / len(judged)
+        points = sum(row.control_points for row in judged)
+        seconds = sum(row.seconds for row in judged)
+        yield name, *map(error, judged), f"{redundancy:.3f}", points, f"{seconds:.0f}"
+
+
+def error(row: Judged) -> str:
+    """Mean error of the relations, or ATE [cm], and how often the map was lost."""
+    text = f"{100 * row.ate_m:.1f}" if row.ate_m is not None else ""
+    if row.relation_m is not None and row.relation_deg is not None:
+        text = f"{100 * row.relation_m:.2f}, {row.relation_deg:.2f}°"
+    return text + (f" (lost {row.lost} x)" if row.lost else "")
+
+
+if __name__ == "__main__":
+    main()

@@ -3,7 +3,6 @@
 python benchmarks/accuracy.py                            all scenes, lidars and awkward variants
 python benchmarks/accuracy.py --only 'loop/*' --pictures out/
 python benchmarks/accuracy.py FOLDER_OR_LOG... --no-scenes
-python benchmarks/accuracy.py --ablate FOLDER_OR_LOG...  one stage changed at a time
 
 A log is judged by what lies beside it: NAME.relations or NAME.truth.tum. --set changes settings.
 """
@@ -18,7 +17,6 @@ from functools import partial
 from pathlib import Path
 
 import fresh_kernels  # noqa: F401  (before numba)
-from ablation import print_ablation
 from cases import LIDARS, LONG, SCENES, Case, logs_in, recorded_case, simulated_cases
 from judging import Judged, judge
 
@@ -81,21 +79,17 @@ def main() -> None:
     parser.add_argument("--only", action="append", help="cases by pattern, such as 'loop/*/none'")
     parser.add_argument("--long", action="store_true", help="also the 2 km of the campus")
     parser.add_argument("--no-scenes", action="store_true", help="only the logs")
-    parser.add_argument("--ablate", action="store_true", help="one stage changed at a time")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw each map")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rows")
     arguments = parser.parse_args()
-    if arguments.ablate:
-        rows = print_ablation(arguments.logs, arguments.only, arguments.set)
-    else:
-        settings = load_settings(overrides=arguments.set)
-        rows = []
-        print(heading(), flush=True)
-        for case in chosen_cases(arguments):
-            row = judge(case, settings, arguments.pictures)
-            rows.append(row.as_json())
-            print(line(row), flush=True)
+    settings = load_settings(overrides=arguments.set)
+    rows = []
+    print(heading(), flush=True)
+    for case in chosen_cases(arguments):
+        row = judge(case, settings, arguments.pictures)
+        rows.append(row.as_json())
+        print(line(row), flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1) + "\n")
 

@@ -205,6 +205,16 @@ def test_scans_a_metre_apart_are_enough(scene):
     assert sparse.off_m <= FINEST_M
 
 
+@pytest.mark.xfail(
+    reason="lone outliers cut bare walls to pieces, whose bent ends feign to tell the way along"
+)
+def test_rooms_seen_four_metres_far_with_one_beam_in_twenty_astray():
+    office = drive("office", "urg04lx")
+    office.assert_no_wrong_closure()
+    assert redundancy(office.result.document.finest) <= 1.10
+    assert office.off_m <= FINEST_M
+
+
 def seen_from_first(poses):
     """(m, 3) poses in the frame of the first."""
     first = SE2.from_array(poses[0]).inverse()
