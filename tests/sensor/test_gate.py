@@ -14,7 +14,7 @@ from bsmap_cli.sensor.gate import (
     find_returns,
     range_limits,
 )
-from bsmap_cli.sensor.range_noise import estimate_range_sigma
+from bsmap_cli.sensor.range_noise import RangeNoise, estimate_range_sigma
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.simulator.simulation import simulate
 
@@ -163,6 +163,24 @@ def test_noise_is_estimated_within_a_fifth(noise_m):
         estimate_range_sigma(scan, DEFAULT, STEP) for scan in itertools.islice(sim.scans(), 10)
     ]
     assert np.array(estimates) == pytest.approx(np.full(10, noise_m), rel=0.2)
+
+
+def test_noise_is_not_taken_from_walls_seen_aslant():
+    """A coarse lidar in a corridor: from beam to beam the range of a straight wall jumps."""
+    sim = simulate("corridor", lidar="lms200", noise_m=0.01, seed=3)
+    estimates = [
+        estimate_range_sigma(scan, DEFAULT, STEP) for scan in itertools.islice(sim.scans(), 20)
+    ]
+    assert np.median(estimates) == pytest.approx(0.01, rel=0.1)
+
+
+def test_noise_is_not_settled_by_where_a_log_begins():
+    """A campus seen from a lonely place, then from among its buildings."""
+    sim = simulate("campus", lidar="lms200", noise_m=0.01, seed=3)
+    noise = RangeNoise(DEFAULT, STEP)
+    for scan in itertools.islice(sim.scans(), 0, 4000, 10):
+        sigma_m = noise.observe(scan)
+    assert sigma_m == pytest.approx(0.01, rel=0.4)
 
 
 @pytest.mark.parametrize("ranges", [[], [1.0], [np.nan] * 500, [1.0] * 20])
