@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2, Points
+from bsmap_cli.slam.edges import EdgeList
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import Loop
-from bsmap_cli.slam.pose_graph import REJECTED, EdgeList, optimise
+from bsmap_cli.slam.pose_graph import REJECTED, optimise
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information, way_deviation
 
 

@@ -6,13 +6,41 @@ import math
 
 import numpy as np
 
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
+from bsmap_cli.slam.edges import EdgeList, Integers
 from bsmap_cli.slam.local_slam import LocalSlam
-from bsmap_cli.slam.pose_graph import EdgeList, optimise
+from bsmap_cli.slam.pose_graph import optimise
 from bsmap_cli.slam.uncertainty import isotropic_information, way_deviation
 
 GROWN = 1.05  # closures that move little are taken in when the graph has grown by so much
 STILL_STEPS = 0.02  # finest knot steps: a solution that still moves by less has converged
+
+
+@kernel
+def surest_chains(
+    source: int, links: Vector, first: Integers, second: Integers, match: float
+) -> Vector:
+    """(n,) least sum of deviations on the way from node `source` to every node.
+
+    links : (n - 1,) between neighbours; first, second : the nodes of edges that add `match`.
+    """
+    found = np.full(len(links) + 1, math.inf)
+    found[source] = 0.0
+    changed = True
+    while changed:  # as often as a chain goes over edges
+        for k in range(len(links)):
+            found[k + 1] = min(found[k + 1], found[k] + links[k])
+        for k in range(len(links) - 1, -1, -1):
+            found[k] = min(found[k], found[k + 1] + links[k])
+        changed = False
+        for e in range(len(first)):
+            i, j = first[e], second[e]
+            if found[i] > found[j] + match or found[j] > found[i] + match:
+                found[i] = min(found[i], found[j] + match)
+                found[j] = min(found[j], found[i] + match)
+                changed = True
+    return found
 
 
 class SubmapGraph:
@@ -25,7 +53,8 @@ class SubmapGraph:
         self._local = local
         self.poses: Points = np.empty((0, 3))
         self._links: list[tuple[float, float]] = []
-        self._loops = EdgeList()
+        self._edges = EdgeList()
+        self._loops = 0
         self._urgent = False
         self._solved = 0
         self._pending = 0
@@ -43,27 +72,35 @@ class SubmapGraph:
         """
         submaps = self._local.submaps
         begun = len(self.poses) < len(submaps)
-        poses = list(self.poses)
-        while len(poses) < len(submaps):
-            k = len(poses)
-            if k == 0:
-                poses.append(submaps[0].pose_local.as_array())
-                continue
-            step = submaps[k - 1].to_submap(submaps[k].pose_local)
-            poses.append((SE2.from_array(poses[-1]) @ step).as_array())
-            self._links.append(self._link_deviation(k))
-        self.poses = np.array(poses).reshape(-1, 3)
-        size = len(poses) + len(self._loops)
+        for k in range(len(self.poses), len(submaps)):
+            self._begin(k)
+        size = len(self.poses) + self._loops
         due = begun and self._pending and size >= GROWN * self._solved
         if begun or self._urgent:
             self._chains = None
         if due or self._urgent:
-            self._optimise(rounds=6 if self._urgent else 1)
+            # where nothing moved much, the sceptical kernel alone will do
+            still = STILL_STEPS * self._local.settings.ladder[-1]
+            rounds = 6 if self._urgent else 1
+            self.poses = optimise(self.poses, self._edges, rounds=rounds, tolerance_m=still).poses
             self._urgent, self._pending, self._solved = False, 0, size
+
+    def _begin(self, k: int) -> None:
+        """Put submap k where tracking from the one before leads."""
+        submaps = self._local.submaps
+        pose = submaps[k].pose_local
+        if k:
+            step = submaps[k - 1].to_submap(pose)
+            deviation = self._link_deviation(k)
+            self._links.append(deviation)
+            self._edges.add(k - 1, k, step.as_array(), isotropic_information(deviation), loop=False)
+            pose = self.pose(k - 1) @ step
+        self.poses = np.concatenate((self.poses, [pose.as_array()]))
 
     def add_loop(self, i: int, j: int, pose_i_j: SE2, information: Points, *, urgent: bool) -> None:
         """A closure saw submap j from submap i."""
-        self._loops.add(i, j, pose_i_j.as_array(), information, loop=True)
+        self._edges.add(i, j, pose_i_j.as_array(), information, loop=True)
+        self._loops += 1
         self._pending += 1
         self._urgent = self._urgent or urgent
 
@@ -74,25 +111,14 @@ class SubmapGraph:
         return self._chains[0], self._chains[1]
 
     def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
-        from scipy.sparse import csr_matrix
-        from scipy.sparse.csgraph import dijkstra
-
-        n = len(self.poses)
-        match = way_deviation(0.0, self._local.settings.ladder[-1])
-        chain = np.arange(n - 1)
-        first = np.concatenate((chain, np.array(self._loops.first, np.int64)))
-        second = np.concatenate((chain + 1, np.array(self._loops.second, np.int64)))
+        edges = self._edges.columns
         links = np.array(self._links).reshape(-1, 2)
-        deviations = np.concatenate((links, np.tile(match, (len(self._loops), 1))))
-        pair = np.minimum(first, second) * n + np.maximum(first, second)
-        found = []
-        for values in deviations.T:
-            lightest = np.lexsort((values, pair))
-            kept = lightest[np.unique(pair[lightest], return_index=True)[1]]
-            matrix = csr_matrix((values[kept], np.divmod(pair[kept], n)), shape=(n, n))
-            chains = dijkstra(matrix, directed=False, indices=np.array([submap]))
-            found.append(np.asarray(chains)[0])
-        return found[0], found[1]
+        match = way_deviation(0.0, self._local.settings.ladder[-1])
+        loops = edges.first[edges.loops], edges.second[edges.loops]
+        metres, radians = (
+            surest_chains(submap, links[:, k].copy(), *loops, match[k]) for k in range(2)
+        )
+        return metres, radians
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
@@ -111,21 +137,3 @@ class SubmapGraph:
             weak = weak or frame.weak
         unit = local.settings.ladder[-1]
         return way_deviation(way, unit, coasted_m=coasted, weak=weak)
-
-    def _optimise(self, rounds: int) -> None:
-        """Solve anew; where nothing moved much, the sceptical kernel alone will do."""
-        edges = EdgeList()
-        for k, deviation in enumerate(self._links):
-            submaps = self._local.submaps
-            step = submaps[k].to_submap(submaps[k + 1].pose_local).as_array()
-            edges.add(k, k + 1, step, isotropic_information(deviation), loop=False)
-        for e in range(len(self._loops)):
-            edges.add(
-                self._loops.first[e],
-                self._loops.second[e],
-                self._loops.pose[e],
-                self._loops.information[e],
-                loop=True,
-            )
-        still = STILL_STEPS * self._local.settings.ladder[-1]
-        self.poses = optimise(self.poses, edges, rounds=rounds, tolerance_m=still).poses
