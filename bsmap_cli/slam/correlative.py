@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import kernel, lean
+from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.slam.likelihood import CHANNELS, Likelihood
+from bsmap_cli.slam.likelihood import Likelihood
 
 Integers = NDArray[np.int64]
+Places = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,14 @@ class Peak:
     score: float
 
 
+@inlined
+def _channel(tx: float, ty: float) -> int:
+    """Channel of a direction: 0 east, 1 north, 2 west, 3 south; a diagonal is of the next one."""
+    if tx > ty:
+        return 0 if ty >= -tx else 3
+    return 1 if tx > -ty else 2 if ty > tx else 3
+
+
 @lean
 def _project(
     points: Points,
@@ -35,25 +44,55 @@ def _project(
     x: float,
     y: float,
     cell_m: float,
+    shape: tuple[int, int],
+    low: int,
+    high: int,
     cells: Integers,
-) -> None:
-    """Cell column, row and channel of each point, turned by `angle` and placed at (x, y)."""
+    places: Places,
+) -> int:
+    """Cells of the points, turned by `angle` and placed at (x, y), by row, column and channel.
+
+    Those that stay on the grid whatever the shift from `low` to `high` go first, and are written
+    to `places`, within a plane of channels; their number.
+    """
+    rows, columns = shape
     cos, sin = math.cos(angle), math.sin(angle)
+    safe, end = 0, len(points)
     for j in range(len(points)):
-        cells[j, 0] = math.floor((cos * points[j, 0] - sin * points[j, 1] + x) / cell_m)
-        cells[j, 1] = math.floor((sin * points[j, 0] + cos * points[j, 1] + y) / cell_m)
+        c = math.floor((cos * points[j, 0] - sin * points[j, 1] + x) / cell_m)
+        r = math.floor((sin * points[j, 0] + cos * points[j, 1] + y) / cell_m)
         tx = cos * tangents[j, 0] - sin * tangents[j, 1]
         ty = sin * tangents[j, 0] + cos * tangents[j, 1]
-        turn = math.atan2(ty, tx) / (0.5 * math.pi)
-        cells[j, 2] = math.floor(turn + 0.5) % CHANNELS
+        channel = _channel(tx, ty)
+        if c + low >= 0 and r + low >= 0 and c + high < columns and r + high < rows:
+            places[safe] = (channel * rows + r) * columns + c
+            k = safe
+            safe += 1
+        else:
+            end -= 1
+            k = end
+        cells[k, 0], cells[k, 1], cells[k, 2] = c, r, channel
+    return safe
 
 
 @lean
-def _score(grids: NDArray[np.uint8], height: int, cells: Integers, dx: int, dy: int) -> float:
+def _score(
+    grids: NDArray[np.uint8],
+    height: int,
+    cells: Integers,
+    places: Places,
+    safe: int,
+    dx: int,
+    dy: int,
+) -> float:
     """Mean likelihood of the points shifted by whole cells, or a bound of it above height 0."""
-    _, _, rows, columns = grids.shape
+    _, channels, rows, columns = grids.shape
     total = 0
-    for j in range(len(cells)):
+    plane = grids[height].reshape(channels * rows * columns)
+    shift = dy * columns + dx
+    for j in range(safe):
+        total += plane[places[j] + shift]
+    for j in range(safe, len(cells)):
         c, r = cells[j, 0] + dx, cells[j, 1] + dy
         if 0 <= c < columns and 0 <= r < rows:
             total += grids[height, cells[j, 2], r, c]
@@ -64,6 +103,8 @@ def _score(grids: NDArray[np.uint8], height: int, cells: Integers, dx: int, dy: 
 def _descend(
     grids: NDArray[np.uint8],
     cells: Integers,
+    places: Places,
+    safe: int,
     height: int,
     dx: int,
     dy: int,
@@ -83,8 +124,7 @@ def _descend(
     depth = 1
     found_x, found_y = dx, dy
     found = -1.0
-    children = np.empty((4, 2), np.int64)
-    scores = np.empty(4)
+    children, scores, order = np.empty((4, 2), np.int64), np.empty(4), np.empty(4, np.int64)
     while depth > 0:
         depth -= 1
         if bounds[depth] <= best:
@@ -93,7 +133,7 @@ def _descend(
         if h == 0:
             if (x - barred[0]) ** 2 + (y - barred[1]) ** 2 < barred[2] ** 2:
                 continue
-            score = _score(grids, 0, cells, x, y)
+            score = _score(grids, 0, cells, places, safe, x, y)
             if score > best:
                 best, found, found_x, found_y = score, score, x, y
             continue
@@ -101,8 +141,13 @@ def _descend(
         for k in range(4):
             children[k, 0] = x + half * (k & 1)
             children[k, 1] = y + half * (k >> 1)
-            scores[k] = _score(grids, h - 1, cells, children[k, 0], children[k, 1])
-        for k in np.argsort(scores):  # best child last, so that it is opened first
+            scores[k] = _score(grids, h - 1, cells, places, safe, children[k, 0], children[k, 1])
+            place = k
+            while place > 0 and scores[order[place - 1]] > scores[k]:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = k
+        for k in order:  # best child last, so that it is opened first
             if scores[k] > best and max(children[k, 0], children[k, 1]) <= reach:
                 stack[depth, 0] = h - 1
                 stack[depth, 1] = children[k, 0]
@@ -129,13 +174,29 @@ def _search(
     top = grids.shape[0] - 1
     block = 1 << top
     cells = np.empty((len(angles), len(points), 3), np.int64)
+    places = np.empty((len(angles), len(points)), np.int32)
+    safe = np.empty(len(angles), np.int64)
     blocks = (2 * reach + 1 + block - 1) // block
     bounds = np.empty(len(angles) * blocks * blocks)
     for a in range(len(angles)):
-        _project(points, tangents, angles[a], x, y, cell_m, cells[a])
+        safe[a] = _project(
+            points,
+            tangents,
+            angles[a],
+            x,
+            y,
+            cell_m,
+            grids.shape[2:],
+            -reach,
+            reach + block,
+            cells[a],
+            places[a],
+        )
         for k in range(blocks * blocks):
             bx, by = k % blocks * block - reach, k // blocks * block - reach
-            bounds[a * blocks * blocks + k] = _score(grids, top, cells[a], bx, by)
+            bounds[a * blocks * blocks + k] = _score(
+                grids, top, cells[a], places[a], safe[a], bx, by
+            )
     best, score = floor, -1.0
     angle, dx, dy = 0, 0, 0
     for k in np.argsort(-bounds, kind="mergesort"):
@@ -143,7 +204,9 @@ def _search(
             break
         a, b = k // (blocks * blocks), k % (blocks * blocks)
         bx, by = b % blocks * block - reach, b // blocks * block - reach
-        found, fx, fy = _descend(grids, cells[a], top, bx, by, reach, best, barred[a])
+        found, fx, fy = _descend(
+            grids, cells[a], places[a], safe[a], top, bx, by, reach, best, barred[a]
+        )
         if found > best:
             best = score = found
             angle, dx, dy = a, fx, fy

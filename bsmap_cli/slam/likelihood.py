@@ -19,7 +19,7 @@ from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
 
-Grid = NDArray[np.uint8]
+Grid = Row = NDArray[np.uint8]
 
 CHANNELS = 4
 REACH_CELLS = 3  # how far round a surface a cell is likely at all
@@ -67,43 +67,48 @@ def _sample(
             n += 1
 
 
-@lean
+@kernel
 def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> None:
     """Write each surface sample into the channels of its direction; points relative to the grid."""
     side = 2 * REACH_CELLS + 1
+    across, up = np.empty(side), np.empty(side)
     for i in range(len(points)):
-        column = math.floor(points[i, 0] / cell_m)
-        row = math.floor(points[i, 1] / cell_m)
+        x, y = points[i, 0] / cell_m, points[i, 1] / cell_m
+        column, row = math.floor(x), math.floor(y)
+        for a in range(side):
+            dx, dy = column + a - REACH_CELLS + 0.5 - x, row + a - REACH_CELLS + 0.5 - y
+            across[a] = math.exp(-0.5 * (dx / SPREAD_CELLS) ** 2)
+            up[a] = 255.0 * math.exp(-0.5 * (dy / SPREAD_CELLS) ** 2)
         for channel in range(CHANNELS):
-            angle = channel * math.pi / 2.0
-            along = directions[i, 0] * math.cos(angle) + directions[i, 1] * math.sin(angle)
+            along = directions[i, channel & 1] * (1.0 if channel < 2 else -1.0)
             if along < 0.3826834323650898:  # cos 67.5 degrees
                 continue
             for a in range(side):
                 for b in range(side):
                     r, c = row + a - REACH_CELLS, column + b - REACH_CELLS
-                    dx = (c + 0.5) * cell_m - points[i, 0]
-                    dy = (r + 0.5) * cell_m - points[i, 1]
-                    squared = (dx * dx + dy * dy) / (SPREAD_CELLS * cell_m) ** 2
-                    value = 255.0 * math.exp(-0.5 * squared)
-                    if value > grid[channel, r, c]:
-                        grid[channel, r, c] = np.uint8(value)
+                    grid[channel, r, c] = max(grid[channel, r, c], np.uint8(up[a] * across[b]))
 
 
 @lean
+def _larger(one: Row, other: Row, larger: Row) -> None:
+    """The larger of each two values, as far as the shorter row goes."""
+    for c in range(len(other)):
+        larger[c] = max(one[c], other[c])
+
+
+@kernel
 def _pyramid(grids: Grid) -> None:
     """Fill heights 1 .. from height 0: the maximum over windows that double in size."""
     heights, channels, rows, columns = grids.shape
+    taller = np.empty(columns, np.uint8)
     for h in range(1, heights):
         half = 1 << (h - 1)
         for k in range(channels):
             for r in range(rows):
-                lower = min(r + half, rows - 1)
-                for c in range(columns):
-                    right = min(c + half, columns - 1)
-                    value = max(grids[h - 1, k, r, c], grids[h - 1, k, r, right])
-                    below = max(grids[h - 1, k, lower, c], grids[h - 1, k, lower, right])
-                    grids[h, k, r, c] = max(value, below)
+                _larger(grids[h - 1, k, r], grids[h - 1, k, min(r + half, rows - 1)], taller)
+                right = taller[min(half, columns) :]  # beyond the edge there is nothing
+                _larger(taller, right, grids[h, k, r])
+                grids[h, k, r, len(right) :] = taller[len(right) :]
 
 
 def build_likelihood(curve_map: CurveMap, *, cell_m: float, heights: int) -> Likelihood:
