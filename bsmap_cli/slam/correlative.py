@@ -147,7 +147,8 @@ def _descend(
                 order[place] = order[place - 1]
                 place -= 1
             order[place] = k
-        for k in order:  # best child last, so that it is opened first
+        for n in range(4):  # best child last, so that it is opened first
+            k = int(order[n])
             if scores[k] > best and max(children[k, 0], children[k, 1]) <= reach:
                 stack[depth, 0] = h - 1
                 stack[depth, 1] = children[k, 0]

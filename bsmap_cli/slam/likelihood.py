@@ -19,7 +19,8 @@ from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
 
-Grid = Row = NDArray[np.uint8]
+Grid = NDArray[np.uint8]
+Row = NDArray[np.uint8]
 
 CHANNELS = 4
 REACH_CELLS = 3  # how far round a surface a cell is likely at all

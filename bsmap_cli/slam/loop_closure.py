@@ -21,6 +21,7 @@ from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information
+from bsmap_cli.slam.viewpoints import Viewpoints, median_range
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search
@@ -72,8 +73,7 @@ class LoopCloser:
     _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
     _next_try: Vector = field(default_factory=lambda: np.empty(0))
     _drawn: dict[int, Submap] = field(default_factory=dict)
-    _viewpoints: list[Points] = field(default_factory=list)
-    _extents_m: Vector = field(default_factory=lambda: np.empty(0))
+    _viewpoints: Viewpoints = field(default_factory=Viewpoints)
     _travelled_m: float = 0.0
 
     def process(self, keyframe: Keyframe) -> None:
@@ -89,7 +89,7 @@ class LoopCloser:
         finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.local.sigma_m)
         settings = self.local.settings
         clusters = ScanLevels(finest, settings.ladder, settings.fitting, self.local.sigma_m)
-        for submap, reach_m, reach_rad in candidates[: settings.loops.tries]:
+        for submap, reach_m, reach_rad in candidates:
             self._try(keyframe, clusters, submap, reach_m, reach_rad)
 
     def _pose_map(self, keyframe: Keyframe) -> SE2:
@@ -97,7 +97,7 @@ class LoopCloser:
         return self.graph.pose(submap.index) @ submap.to_submap(keyframe.pose_local)
 
     def _candidates(self, keyframe: Keyframe) -> list[tuple[Submap, float, float]]:
-        """Finished submaps that may see what the keyframe sees, nearest first."""
+        """The finished submaps that most likely see what the keyframe sees, nearest first."""
         unit, settings = self.local.settings.ladder[-1], self.local.settings.loops
         count = max(0, keyframe.submap - 1)
         if count == 0:
@@ -105,30 +105,22 @@ class LoopCloser:
         self._remember(count)
         metres, radians = self.graph.deviations_from(keyframe.submap)
         here = self._pose_map(keyframe)
-        view_m = _view_m(keyframe)
+        view_m = median_range(keyframe.clusters.points)
         reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
-        away = np.hypot(*(self.graph.poses[:count, :2] - (here.x, here.y)).T)
-        near = away <= self._extents_m[:count] + view_m + reach_m
-        near &= self._next_try[:count] <= self._travelled_m
-        found = []
-        for index in np.flatnonzero(near).tolist():
-            submap = self.local.submaps[index]
-            seen = self.graph.pose(index).inverse() @ here
-            reach = float(reach_m[index])
-            away_m = np.hypot(*(self._viewpoints[index] - (seen.x, seen.y)).T)
-            distance = float(away_m.min())
-            if distance < view_m + reach:
-                turn = settings.deviations * float(radians[index])
-                found.append((distance / (view_m + reach), submap, reach, turn))
-        found.sort(key=lambda entry: (entry[0], entry[1].index))
-        return [(submap, reach, turn) for _, submap, reach, turn in found]
+        within = view_m + reach_m
+        distances = self._viewpoints.distances(self.graph.poses, here.x, here.y, within)
+        found = np.flatnonzero((distances < within) & (self._next_try[:count] <= self._travelled_m))
+        nearest = found[np.argsort(distances[found] / within[found], kind="stable")]
+        return [
+            (self.local.submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
+            for k in nearest[: settings.tries].tolist()
+        ]
 
     def _remember(self, count: int) -> None:
         """Keep where finished submaps were seen from, and when each may be tried."""
-        for submap in self.local.submaps[len(self._extents_m) : count]:
-            self._extents_m = np.append(self._extents_m, submap.extent_m)
+        for submap in self.local.submaps[len(self._viewpoints) : count]:
             self._next_try = np.append(self._next_try, 0.0 if submap.keyframes else math.inf)
-            self._viewpoints.append(np.array(submap.viewpoints[::4]))
+            self._viewpoints.add(submap)
 
     def _try(
         self,
@@ -240,7 +232,7 @@ class LoopCloser:
             if (
                 math.hypot(gap.x, gap.y) < AGREED_STEPS * unit + 0.05 * way
                 and abs(gap.theta) < math.radians(3.0)
-                and _view_m(keyframe) <= way < 100.0 * unit
+                and median_range(keyframe.clusters.points) <= way < 100.0 * unit
             ):
                 self._doubtful.remove((other, other_wanted))
                 self._accept(other)
@@ -248,12 +240,6 @@ class LoopCloser:
                 return
         self._doubtful.append((loop, wanted))
         del self._doubtful[:-50]
-
-
-def _view_m(keyframe: Keyframe) -> float:
-    """Half of what a keyframe sees lies farther away [m]."""
-    points = keyframe.clusters.points
-    return float(np.median(np.hypot(points[:, 0], points[:, 1]))) if len(points) else 0.0
 
 
 def _position_deviation(information: Points) -> float:

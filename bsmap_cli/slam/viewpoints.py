@@ -1,0 +1,74 @@
+"""From where finished submaps were seen: which of them may show what is seen from here."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bsmap_cli.geometry.compiled import kernel
+from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.slam.edges import Integers
+from bsmap_cli.slam.submap import Submap
+
+EVERY = 4  # a viewpoint of so many is kept: keyframes lie close together
+
+
+@kernel
+def _nearest(
+    poses: Points,
+    x: float,
+    y: float,
+    extents_m: Vector,
+    points: Points,
+    starts: Integers,
+    within_m: Vector,
+    distances: Vector,
+) -> None:
+    for k in range(len(distances)):
+        distances[k] = math.inf
+        dx, dy = x - poses[k, 0], y - poses[k, 1]
+        if math.hypot(dx, dy) > extents_m[k] + within_m[k]:
+            continue
+        cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+        seen_x, seen_y = cos * dx + sin * dy, cos * dy - sin * dx
+        for p in range(starts[k], starts[k + 1]):
+            away = math.hypot(points[p, 0] - seen_x, points[p, 1] - seen_y)
+            distances[k] = min(distances[k], away)
+
+
+@kernel
+def median_range(points: NDArray[np.float32]) -> float:
+    """Half of (n, 2) points lie farther away [m]; 0 without any."""
+    if len(points) == 0:
+        return 0.0
+    return float(np.median(np.hypot(points[:, 0], points[:, 1])))
+
+
+class Viewpoints:
+    """Those of all finished submaps, one submap after the other."""
+
+    def __init__(self) -> None:
+        self._extents_m = np.empty(0)
+        self._points = np.empty((0, 2))
+        self._starts = np.zeros(1, np.int64)
+
+    def __len__(self) -> int:
+        return len(self._extents_m)
+
+    def add(self, submap: Submap) -> None:
+        """One submap more that has been finished."""
+        seen_from = np.array(submap.viewpoints[::EVERY]).reshape(-1, 2)
+        self._extents_m = np.append(self._extents_m, submap.extent_m)
+        self._points = np.concatenate((self._points, seen_from))
+        self._starts = np.append(self._starts, len(self._points))
+
+    def distances(self, poses: Points, x: float, y: float, within_m: Vector) -> Vector:
+        """(n,) way [m] from (x, y) to the nearest viewpoint of each submap; inf far beyond reach.
+
+        poses : (n, 3) of the submaps in the frame of x and y. within_m : (n,) how far anyone asks.
+        """
+        found = np.empty(len(within_m))
+        _nearest(poses, x, y, self._extents_m, self._points, self._starts, within_m, found)
+        return found
