@@ -38,12 +38,15 @@ def _nearest(
             distances[k] = min(distances[k], away)
 
 
-@kernel
 def median_range(points: NDArray[np.float32]) -> float:
     """Half of (n, 2) points lie farther away [m]; 0 without any."""
-    if len(points) == 0:
+    n = len(points)
+    if n == 0:
         return 0.0
-    return float(np.median(np.hypot(points[:, 0], points[:, 1])))
+    middle = (n - 1) // 2, n // 2
+    ranges = np.hypot(points[:, 0], points[:, 1])
+    ranges.partition(middle)
+    return 0.5 * (float(ranges[middle[0]]) + float(ranges[middle[1]]))
 
 
 class Viewpoints:
