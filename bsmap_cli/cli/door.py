@@ -85,7 +85,8 @@ def _one_line(error: BaseException) -> str:
 def _parser_message(error: Any) -> str:
     context = getattr(error, "ctx", None)
     path = context.command_path if context else "bsmap"
-    return f"{error.format_message().rstrip('.')}; see `{path} --help`"
+    text = error.format_message().rstrip(".").replace(": Value error, ", ": ")
+    return f"{text}; see `{path} --help`"
 
 
 def _remedy(error: OSError) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Literal, TypeVar, get_args
 
@@ -23,6 +23,41 @@ PICTURE_FORMATS: dict[str, Literal["png", "svg", "pdf"]] = {
 }
 MAP_FORMATS: dict[str, MapFormat] = {f".{kind}": kind for kind in get_args(MapFormat)}
 TRAJECTORY_FORMATS = {".csv": "csv", ".json": "json", ".kitti": "kitti"}  # others are TUM
+PAGE_EXTENSIONS = (".html", ".htm")
+# what the name of an output may promise
+KNOWN_EXTENSIONS = {
+    *(*LOG_FORMATS, *PICTURE_FORMATS, *MAP_FORMATS, *TRAJECTORY_FORMATS, *PAGE_EXTENSIONS),
+    *(".tum", ".pgm", ".jpg", ".jpeg", ".gif", ".db3", ".clf"),
+}
+
+
+def refuse_extension(path: str, own: Collection[str], remedy: str) -> None:
+    """Refuse an output whose name promises another format than the `own` extensions.
+
+    Names without an extension, or with one that no program knows, are the user's business.
+
+    Raises
+    ------
+    UsageError : with the remedy.
+    """
+    extension = Path(path).suffix.lower()
+    if extension in KNOWN_EXTENSIONS and extension not in own:
+        raise UsageError(f"{path}: {remedy}")
+
+
+def refuse_no_map(path: str) -> None:
+    """Refuse an output for a map whose name promises another format; see `refuse_extension`."""
+    refuse_extension(
+        path, (".bsm",), "a map is written as .bsm: name it so; `bsmap export` makes other formats"
+    )
+
+
+def refuse_no_trajectory(path: str | None) -> None:
+    """Refuse an output for a trajectory, if one is wanted, whose name promises something else."""
+    if path is None:
+        return
+    own = (".tum", *TRAJECTORY_FORMATS)
+    refuse_extension(path, own, f"a trajectory is written as {', '.join(own)}: end the name so")
 
 
 def chosen_format(path: str, said: str | None, by_extension: Mapping[str, Kind]) -> Kind:

@@ -62,21 +62,25 @@ def text_input(path: str) -> Iterator[Iterator[str]]:
     """
     from bsmap_cli.logs.byte_streams import DamagedBytesError, unpack
 
+    name = _shown(path)
     with binary_input(path) as stream:
         try:
             yield io.TextIOWrapper(unpack(stream), encoding="utf-8-sig")
-        except (UnicodeDecodeError, DamagedBytesError) as error:
-            raise LogError(f"{path}: not a text file: {error}") from error
-        except LogError as error:
-            raise LogError(f"{path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LogError(f"{name} is not a text file (UTF-8): is it the right one?") from error
+        except (LogError, DamagedBytesError) as error:
+            raise LogError(f"{name}: {error}") from error
 
 
 def read_trajectory(path: str) -> Trajectory:
-    """A trajectory in TUM, CSV or JSON; LogError where it cannot be read."""
+    """A trajectory in TUM, CSV or JSON; LogError where it cannot be read or holds no pose."""
     from bsmap_cli.exchange import trajectories
 
     with text_input(path) as lines:
-        return trajectories.read_trajectory(lines)
+        trajectory = trajectories.read_trajectory(lines)
+    if not len(trajectory):
+        raise LogError(f"{_shown(path)} holds no pose: name a trajectory")
+    return trajectory
 
 
 def read_map_file(path: str) -> tuple[MapDocument, MapSizes]:
@@ -90,8 +94,12 @@ def read_map_file(path: str) -> tuple[MapDocument, MapSizes]:
             whole = put_back(first, stream)
             return _read_twin(whole) if first == b"{" else read_map_with_sizes(whole)
         except MapFileError as error:
-            name = "standard input" if path == STDIN else path
-            raise MapFileError(f"{name}: {error}") from error
+            raise MapFileError(f"{_shown(path)}: {error}") from error
+
+
+def _shown(path: str) -> str:
+    """What an input is called in a message."""
+    return "standard input" if path == STDIN else path
 
 
 def _read_twin(stream: BinaryIO) -> tuple[MapDocument, MapSizes]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from bsmap_cli.cli.door import DONE, LOSSES
 from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import LogError
+from bsmap_cli.logs.finding import counted
 
 if TYPE_CHECKING:
     from bsmap_cli.logs.reader import ReadReport
@@ -23,7 +24,7 @@ def reading_losses(report: ReadReport) -> tuple[str, ...]:
     """One line each for what could not be read."""
     losses = []
     if report.scans_skipped:
-        losses.append(f"{report.scans_skipped} scans could not be read")
+        losses.append(f"{counted(report.scans_skipped, 'scan')} could not be read")
     if report.truncated:
         losses.append("part of the log is missing or damaged; what it holds was used")
     return tuple(losses)

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bsmap_cli.cli.formats import refuse_no_map, refuse_no_trajectory
 from bsmap_cli.cli.inputs import STDIN
 from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import (
@@ -26,6 +27,7 @@ from bsmap_cli.cli.outputs import STDOUT, Outputs, write_trajectory
 from bsmap_cli.cli.report import print_json, size
 from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import UsageError
+from bsmap_cli.logs.finding import counted
 
 if TYPE_CHECKING:
     from bsmap_cli.config import Settings
@@ -82,10 +84,12 @@ def make_map(
     talk: Talk,
     *,
     old: MapDocument | None = None,
+    poses: str | None = None,
 ) -> int:
     """Run `work` over the log, write what it made and report; the exit code.
 
     old : a map that is gone on with, whose knot step ends the ladder.
+    poses : the file that tells where the robot was, so that no odometry is used.
     """
     from bsmap_cli.cli.progress import progress_bar
     from bsmap_cli.evaluation.map_statistics import map_statistics
@@ -100,6 +104,8 @@ def make_map(
     with Outputs(force=making.force, inputs=(*log.logs, *log.beside)) as outputs:
         map_out = outputs.add(making.output, binary=True)
         traj_out = outputs.add(making.traj) if making.traj is not None else None
+        refuse_no_map(making.output)
+        refuse_no_trajectory(making.traj)
         settings = log.settings.settings(log.sensor.overrides())
         if old is not None:
             settings = settings_for_map(settings, old)
@@ -111,7 +117,8 @@ def make_map(
         with open_log(log.logs, options) as reader:
 
             def started() -> None:
-                talk.note(f"odometry: {reader.report.odometry}")
+                odometry = f"odometry: {reader.report.odometry}"
+                talk.note(odometry if poses is None else f"poses: {poses}")
 
             with progress_bar(talk, started=started, total=options.max_scans) as bar:
                 run = work(reader, settings, bar)
@@ -185,7 +192,7 @@ def summary_line(report: dict[str, Any], map_bytes: int) -> str:
     """The last line of a run."""
     pace = report["realtime_factor"]
     parts = [
-        f"{report['scans']} scans",
+        counted(report["scans"], "scan"),
         f"{report['seconds']:.1f} s",
         f"{pace:.{0 if pace >= 10 else 1}f} x real time" if pace is not None else "no duration",
         f"{report['scans_skipped']} skipped",

@@ -64,6 +64,8 @@ class Outputs:
 
     def _check_file(self, target: Output) -> None:
         final = target.final
+        if not target.path:
+            raise UsageError("the name of an output is empty: name a file")
         if final.is_dir():
             raise UsageError(f"{target.path} is a folder: name a file in it")
         if not final.parent.is_dir():

@@ -59,7 +59,7 @@ def placed(
         )
     pose = placement.pose_a_b
     talk.note(
-        f"B lies in A at {pose.x:.3f},{pose.y:.3f},{math.degrees(pose.theta):.3f}; "
+        f"B lies in A at {pose.x:z.3f},{pose.y:z.3f},{math.degrees(pose.theta):z.3f}; "
         f"{placement.overlap_m:.1f} m of its curves lie on those of A"
     )
     return placement
@@ -70,5 +70,5 @@ def _pose(at: str | None) -> SE2 | None:
 
     if at is None:
         return None
-    x, y, yaw_deg = numbers("--at", at, 3)
+    x, y, yaw_deg = numbers("--at", at, "1,2,90")
     return SE2.from_array((x, y, math.radians(yaw_deg)))

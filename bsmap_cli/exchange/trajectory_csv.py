@@ -14,6 +14,7 @@ from bsmap_cli.sensor.stamps import parse_stamp
 from bsmap_cli.sensor.trajectory import Trajectory
 
 HEADER = "stamp_ns,x,y,theta"
+LISTED = 8  # columns in a message
 
 
 def write_trajectory_csv(stream: TextIO, trajectory: Trajectory) -> None:
@@ -35,7 +36,10 @@ def read_trajectory_csv(lines: Iterable[str]) -> Trajectory:
     stamp_name = "stamp_ns" if "stamp_ns" in names else "t"
     missing = [name for name in (stamp_name, "x", "y", "theta") if name not in names]
     if missing:
-        raise LogError(f"the trajectory has no column {missing[0]}: it has {', '.join(names)}")
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        raise LogError(
+            f"the trajectory has no column {missing[0]}: it has {', '.join(names[:LISTED])}{more}"
+        )
     stamps, poses = [], []
     for row in reader:
         try:

@@ -12,6 +12,8 @@ from bsmap_cli.errors import LogError
 from bsmap_cli.sensor.stamps import format_stamp, parse_stamp
 from bsmap_cli.sensor.trajectory import Trajectory
 
+FIELDS = 8  # of a line
+
 
 def write_tum(stream: TextIO, trajectory: Trajectory) -> None:
     """One line for each pose, in order: nine decimals of seconds from integer nanoseconds."""
@@ -32,13 +34,13 @@ def read_tum(stream: Iterable[str]) -> Trajectory:
         fields = line.partition("#")[0].replace(",", " ").split()
         if not fields:
             continue
+        form = f"line {number} of the trajectory is not `stamp x y z qx qy qz qw`"
+        if len(fields) != FIELDS:
+            raise LogError(f"{form}: it has {len(fields)} of {FIELDS} numbers")
         try:
             stamp, (x, y, _, qx, qy, qz, qw) = parse_stamp(fields[0]), map(float, fields[1:])
         except ValueError as error:
-            raise LogError(
-                f"line {number} of the trajectory is not `stamp x y z qx qy qz qw`:"
-                f" {str(error)[:120]}"
-            ) from error
+            raise LogError(f"{form}: {str(error)[:120]}") from error
         yaw = math.atan2(2.0 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
             raise LogError(f"line {number} of the trajectory holds a number that is not finite")

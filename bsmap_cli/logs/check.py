@@ -16,6 +16,9 @@ CLOCK_SET_S = 3600.0
 """No robot pauses that long in one run: the clock was set."""
 
 FEW_RETURNS_SHARE = 0.5
+FAR_M = 100.0
+"""No planar lidar meets most of its surroundings farther away: the ranges are not in metres."""
+
 FOLLOWED_STEP_M, FOLLOWED_TURN_DEG = 0.4, 35.0
 """How far from the last pose tracking searches when it is lost; motion beyond needs odometry."""
 
@@ -99,6 +102,15 @@ def _of_beams(statistics: ScanStatistics) -> Iterator[Finding]:
             message=f"the number of beams changes: {counts[0]} to {counts[-1]}",
             remedy="none is needed: each scan has its own angles",
             value=float(len(counts)),
+        )
+    usual_m = statistics.usual_range_m()
+    if usual_m > FAR_M:
+        yield Finding(
+            name="units",
+            level="problem",
+            message=f"ranges are about {usual_m:.0f}, which are no metres in front of a lidar",
+            remedy="write them in metres: many sensors give millimetres",
+            value=usual_m,
         )
     invalid = statistics.invalid_share()
     if invalid > FEW_RETURNS_SHARE:

@@ -16,6 +16,7 @@ from bsmap_cli.sensor.scan import Scan
 
 _KEPT_INTERVALS = 1000
 _SAMPLED_INTERVALS = 5000
+_SAMPLED_SCANS = 1000
 _BLIND_SHARE = 0.05
 _UNSTATED_RANGE_M = 80.0
 _NO_RETURN_SHARE = 0.995
@@ -49,6 +50,7 @@ class ScanStatistics:
         self._before: dict[str, tuple[Scan, Ranges]] = {}
         self._longest: list[tuple[float, float]] = []
         self._intervals_s: list[float] = []
+        self._usual_m: list[float] = []
         self._invalid = 0.0
 
     def add(self, scan: Scan) -> None:
@@ -59,6 +61,8 @@ class ScanStatistics:
         self.beam_counts.add(len(scan.ranges_m))
         ranges = _valid_ranges(scan)
         self.steady.add(scan, ranges)
+        if len(self._usual_m) < _SAMPLED_SCANS:
+            self._usual_m.append(_usual_range_m(scan))
         invalid = float(np.isnan(ranges).mean())
         self._invalid += invalid
         self.blind += invalid > 1.0 - _BLIND_SHARE
@@ -74,6 +78,10 @@ class ScanStatistics:
     def longest_intervals(self) -> list[tuple[float, float]]:
         """Seconds after the first scan and length [s] of the longest intervals."""
         return [(at_s, interval_s) for interval_s, at_s in self._longest]
+
+    def usual_range_m(self) -> float:
+        """Median over the first scans of the range in the middle of each; 0 without returns."""
+        return float(np.median(self._usual_m)) if self._usual_m else 0.0
 
     def invalid_share(self) -> float:
         """Mean share of beams without a return."""
@@ -108,6 +116,14 @@ def _valid_ranges(scan: Scan) -> Ranges:
         far_m = _UNSTATED_RANGE_M
     ranges[~((ranges > 0.0) & (ranges >= scan.range_min_m) & (ranges <= far_m))] = np.nan
     return ranges
+
+
+def _usual_range_m(scan: Scan) -> float:
+    """The range in the middle of a scan, of all that are no code for "nothing there"; else 0."""
+    ranges = scan.ranges_m
+    with np.errstate(invalid="ignore"):
+        seen = np.isfinite(ranges) & (ranges > 0.0) & (ranges < _NO_RETURN_SHARE * scan.range_max_m)
+    return float(np.median(ranges[seen])) if seen.any() else 0.0
 
 
 def _step(before: Scan, ranges_before: Ranges, scan: Scan, ranges: Ranges) -> tuple[float, float]:

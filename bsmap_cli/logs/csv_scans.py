@@ -3,6 +3,9 @@
 Columns by name, in any order: `stamp_ns` or `t` [s]; `r0,r1,...` [m]. Optional: `x,y,theta`
 (odometry), `angle_min,angle_increment` [rad] (else from the command line),
 `range_min,range_max`, `time_increment`, `laser_x,laser_y,laser_theta` (the laser on the base).
+
+The header tells the separator: a comma, or a semicolon or tab as spreadsheets write them where
+the decimal point is a comma.
 """
 
 from __future__ import annotations
@@ -25,6 +28,8 @@ TOPIC = "csv"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _RANGE = re.compile(r"r(\d{1,7})")
 _STAMP_LIMIT = 2**63
+_SEPARATORS = (b",", b";", b"\t")
+_QUOTED = re.compile(rb'"([^"]*)"')
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,7 @@ class _Header:
     columns: dict[str, int]
     ranges: tuple[int, ...]
     ranges_last: bool
+    separator: bytes
 
 
 class CsvParser:
@@ -57,18 +63,21 @@ class CsvParser:
         for source in self._sources:
             header: _Header | None = None
             for number, line in lines_of(source, report):
-                cells = _cells(line)
-                if not cells:
+                text = _text(line)
+                if not text:
                     continue
                 if header is None:
-                    header = self._header(_names(cells), source.name)
+                    header = self._header(text, source.name)
                     continue
                 try:
+                    cells = _cells(text, header.separator)
                     yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
                 except (ValueError, BadMessageError) as error:
                     yield bad_line(number, source, error)
 
-    def _header(self, names: list[str], source: str) -> _Header:
+    def _header(self, text: bytes, source: str) -> _Header:
+        separator = _separator_of(text) or b","
+        names = _names(text, separator)
         columns = {name: index for index, name in enumerate(names)}
         if "stamp_ns" not in columns and "t" not in columns:
             raise LogError(f"{source} has no column stamp_ns or t: a scan needs a stamp")
@@ -88,7 +97,7 @@ class CsvParser:
             if column not in columns and given is None:
                 raise UsageError(f"{source} has no column {column}: give {flag}")
         ranges_last = ranges == tuple(range(len(names) - len(ranges), len(names)))
-        return _Header(columns, ranges, ranges_last)
+        return _Header(columns, ranges, ranges_last, separator)
 
     def _scan(self, cells: list[bytes], header: _Header, *, is_whole: bool) -> TextScan:
         if not is_whole and len(cells) < len(header.columns):
@@ -147,13 +156,21 @@ class _Fields:
         return self.cells[index] if index < len(self.cells) else b""
 
 
-def _cells(line: bytes) -> list[bytes]:
-    """The cells of a row; none for an empty line or a comment."""
-    text = line.partition(b"#")[0].replace(b'"', b"").strip().removeprefix(BYTE_ORDER_MARK)
-    return text.split(b",") if text else []
+def _text(line: bytes) -> bytes:
+    """What a line says: nothing for an empty one or a comment."""
+    text = line.partition(b"#")[0].strip(b" \r\n").removeprefix(BYTE_ORDER_MARK)
+    if b'"' in text:  # a comma in quotes is a decimal point
+        text = _QUOTED.sub(lambda cell: cell[1].replace(b",", b"."), text)
+    return text if text.strip() else b""
 
 
-def _names(cells: list[bytes]) -> list[str]:
+def _cells(text: bytes, separator: bytes) -> list[bytes]:
+    """The cells of a row; a comma that separates nothing is a decimal point."""
+    return (text if separator == b"," else text.replace(b",", b".")).split(separator)
+
+
+def _names(text: bytes, separator: bytes) -> list[str]:
+    cells = text.split(separator)
     return [cell.strip().decode("utf-8", "replace").lower() for cell in cells]
 
 
@@ -167,7 +184,15 @@ def _ranges(texts: list[bytes]) -> Ranges:
 
 def is_header(line: bytes) -> bool:
     """Whether a line of text names the columns of a log of scans."""
-    names = _names(_cells(line))
-    return len(names) > 2 and any(
-        name in ("t", "stamp_ns") or _RANGE.fullmatch(name) for name in names
-    )
+    return _separator_of(_text(line)) is not None
+
+
+def _separator_of(text: bytes) -> bytes | None:
+    """What separates the names of columns; None where these are none of a log of scans."""
+    for separator in _SEPARATORS:
+        names = _names(text, separator)
+        if len(names) > 2 and any(
+            name in ("t", "stamp_ns") or _RANGE.fullmatch(name) for name in names
+        ):
+            return separator
+    return None

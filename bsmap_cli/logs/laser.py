@@ -69,9 +69,9 @@ def _sweep(
     if count < 2:
         raise BadMessageError("a scan without beams")
     if not (math.isfinite(low) and 0.0 < abs(step) <= math.pi):
-        raise BadMessageError("a scan whose beam angles are no angles")
+        raise BadMessageError("a scan whose angle_increment is no step in radians")
     if span_rad > _TURN_LIMIT_RAD or abs(low) > 2.0 * math.tau:
-        raise BadMessageError("a scan of more than a turn")
+        raise BadMessageError("a scan of more than a turn: its angles must be in radians")
     if not math.isfinite(time_step):
         time_step = 0.0
     if upside_down:

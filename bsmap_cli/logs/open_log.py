@@ -22,7 +22,18 @@ from bsmap_cli.logs.text_log import TextLog
 
 _SNIFFED_BYTES = 16
 _SNIFFED_TEXT_BYTES = 1 << 20
-_KNOWN = "MCAP, ROS 1 bags, ROS 2 bags, CARMEN and CSV are known"
+_KNOWN = (
+    "MCAP, ROS 1 bags, ROS 2 bags, CARMEN, and CSV with a header row of t or stamp_ns and"
+    " r0,r1,... are known"
+)
+_NO_LOGS = {
+    b"\x89BSM": "a map and no log: `bsmap stats` tells what it holds",
+    b"\xff\xfe": "text in UTF-16: save it as UTF-8",
+    b"\xfe\xff": "text in UTF-16: save it as UTF-8",
+    b"PK\x03\x04": "a zip archive: unpack it first",
+    b"BZh": "packed with bzip2: unpack it first",
+    b"\xfd7zXZ\0": "packed with xz: unpack it first",
+}
 
 
 def open_log(sources: Sequence[str | Path | BinaryIO], options: ReadOptions) -> LogReader:
@@ -92,6 +103,9 @@ def _kind_of(source: Source) -> str | None:
         return kind
     if not start:
         raise LogError(f"{source.name} is empty")
+    for magic, what in _NO_LOGS.items():
+        if start.startswith(magic):
+            raise LogError(f"{source.name} is {what}")
     raise LogError(f"{source.name} is not a log that bsmap reads: {_KNOWN}")
 
 

@@ -134,11 +134,12 @@ def _parts(source: Source) -> list[Source]:
     if not children:
         raise LogError(f"{path} is a folder without a log: name a log")
     lacks = dangling + _missing_parts(path, [child.name for child in children])
+    folder = path.name or path.resolve().name
     return [
         part
         for child in children
         for part in _parts(
-            Source(name=f"{path.name}/{child.name}", path=child, found=True, lacks=lacks)
+            Source(name=f"{folder}/{child.name}", path=child, found=True, lacks=lacks)
         )
     ]
 

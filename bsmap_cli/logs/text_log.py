@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
@@ -19,6 +20,13 @@ from bsmap_cli.sensor.stamps import parse_stamp
 
 LINE_LIMIT_BYTES = 1 << 24
 _LONGEST_FAULT = 120
+# what int() and float() say, in words for a user
+_PLAINLY = {
+    re.compile(
+        r"invalid literal for int\(\) with base 10: b?('.*')", re.S
+    ): r"\1 is no whole number",
+    re.compile(r"could not convert string to float: b?('.*')", re.S): r"\1 is no number",
+}
 
 
 class TextScan(NamedTuple):
@@ -154,6 +162,8 @@ _POSES = "poses in the log"
 def bad_line(number: int, source: Source, error: Exception) -> BadMessageError:
     """What is wrong with a line, in few words however long the line is."""
     what = str(error)
+    for pattern, plain in _PLAINLY.items():
+        what = pattern.sub(plain, what)
     if len(what) > _LONGEST_FAULT:
         what = what[:_LONGEST_FAULT] + " ..."
     return BadMessageError(f"line {number} of {source.name}: {what}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
+from shlex import quote
 
 from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.logs.decoding import Kind
@@ -52,7 +53,7 @@ def choose_odometry_topic(
         if topic in candidates:
             return topic, candidates
     if candidates:
-        lines = "\n".join(f"  --odom {topic}" for topic in candidates)
+        lines = _flags("--odom", candidates)
         raise UsageError(f"{name} has no odometry topic {asked}: choose one with\n{lines}")
     raise UsageError(f"{name} has no odometry topic {asked}, nor any other: leave out --odom")
 
@@ -75,14 +76,22 @@ def _named(
             raise UsageError(f"{topic} of {name} is {types[topic] or 'untyped'}, not a scan topic")
     close = get_close_matches(asked, usable, n=1)
     if close:
-        raise UsageError(f"{name} has no topic {asked}: did you mean --topic {close[0]}")
+        raise UsageError(f"{name} has no topic {asked}: did you mean --topic {quote(close[0])}")
     if usable:
         raise UsageError(f"{name} has no topic {asked}: choose from\n" + _topic_lines(usable))
     raise LogError(f"{name} has no topic {asked}, nor any scan topic{_listing(types)}")
 
 
 def _topic_lines(topics: tuple[str, ...]) -> str:
-    return "\n".join(f"  --topic {topic}" for topic in topics)
+    return _flags("--topic", topics)
+
+
+def _flags(flag: str, topics: tuple[str, ...]) -> str:
+    """Lines ready for a shell; of very many the first few, and how to see the rest."""
+    lines = [f"  {flag} {quote(topic)}" for topic in topics[:_LISTED]]
+    if len(topics) > _LISTED:
+        lines.append(f"  or one of {len(topics) - _LISTED} more: `bsmap info` lists them")
+    return "\n".join(lines)
 
 
 def _listing(types: Mapping[str, str]) -> str:

@@ -50,6 +50,11 @@ class ChunkReader:
         self.file_crc = 0  # of every byte before the chunk at hand
         self._running_crc = 0
         magic = self._take(len(MAGIC), "the magic of a .bsm map")
+        if magic[:4] != MAGIC[:4] and magic[4:] != MAGIC[4:]:
+            raise MapFileError(
+                f"no map but another kind of file (byte 0: expected the magic {MAGIC.hex(' ')},"
+                f" found {magic.hex(' ')}): name a .bsm, or its twin in JSON"
+            )
         if magic != MAGIC:
             refuse(0, f"the magic {MAGIC.hex(' ')} of a .bsm map", magic.hex(" "))
 

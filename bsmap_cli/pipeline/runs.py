@@ -82,12 +82,13 @@ def run_map(
         np.frombuffer(stamps_ns, np.int64), np.frombuffer(used_poses).reshape(-1, 3)
     )
     without = feed.count - used
+    odometry = {"odometry": "none"} if isinstance(poses, Trajectory) else {}
     return _finished(
         feed,
         settings,
         mapper.document(),
         trajectory,
-        figures={"scans_used": used, "keyframes": used},
+        figures={"scans_used": used, "keyframes": used, **odometry},
         stage_seconds={"merge": insert_s},
         losses=(f"{without} scans have no pose near their stamp",) if without else (),
     )

@@ -64,7 +64,9 @@ def _beam_table(
     angles = first_rad + np.arange(beams) * step_rad
     used = np.ones(beams, bool)
     for start_deg, end_deg in ignored_deg:
-        width = (end_deg - start_deg) % 360.0
+        width = end_deg - start_deg
+        if width < 360.0:  # else all around, which the remainder would take for nothing
+            width %= 360.0
         used &= (np.degrees(angles) - start_deg) % 360.0 > width
     return np.cos(angles), np.sin(angles), used
 

@@ -98,6 +98,18 @@ def test_usage_errors_are_one_line_and_exit_2(arguments, words, tmp_path):
     assert names(tmp_path) == []
 
 
+def test_the_list_of_commands_says_what_each_does():
+    listed = bsmap("--help", COLUMNS="80").stdout.decode().partition("Commands:")[2]
+    assert listed.count("\n") > 15
+    assert "..." not in listed
+
+
+def test_the_parser_speaks_as_the_rest(tmp_path):
+    said = message(bsmap("slam", "x.mcap", "-o", "x.bsm", "--color", "pink", cwd=tmp_path))
+    assert "'pink' is not one of 'auto', 'always', 'never'" in said
+    assert "Value error" not in said
+
+
 def test_bsmap_alone_shows_its_help_and_exits_2():
     ran = bsmap()
     assert ran.returncode == 2

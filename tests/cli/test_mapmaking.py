@@ -130,6 +130,14 @@ def test_poses_from_odometry_and_from_a_file(here):
         assert len(map_of(here / f"{poses}.bsm").finest) > 0
 
 
+def test_poses_from_a_file_are_what_was_used(here):
+    """Whatever odometry the log holds besides."""
+    arguments = ("map", "run.mcap", "--poses", "truth.tum", "-o", "m.bsm", "--json")
+    ran = bsmap(*arguments, cwd=here)
+    assert ran.stderr.decode().splitlines()[0] == "poses: truth.tum"
+    assert report_of(ran)["odometry"] == "none"
+
+
 def test_scans_without_a_pose_are_a_loss(here):
     lines = (here / "truth.tum").read_text().splitlines(keepends=True)
     (here / "half.tum").write_text("".join(lines[: SCANS // 2]))
@@ -186,7 +194,7 @@ def test_of_two_scan_topics_one_is_asked_for(here):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["map.bsm", "-o", "m.bsm"], 1, "not a log"),
+        (["map.bsm", "-o", "m.bsm"], 1, "a map and no log"),
         (["truth.tum", "-o", "m.bsm"], 1, "not a log"),
         (["empty", "-o", "m.bsm"], 1, "empty"),
         (["absent.mcap", "-o", "m.bsm"], 1, "absent.mcap"),
@@ -208,6 +216,13 @@ def test_of_two_scan_topics_one_is_asked_for(here):
         (["run.mcap", "-o", "m.bsm", "--every", "0"], 2, "--every"),
         (["run.mcap", "-o", "m.bsm", "--set", "loops.enabeld=true"], 2, "loops.enabled"),
         (["run.mcap", "-", "-o", "m.bsm"], 2, "cannot be joined"),
+        (["run.mcap", "-o", "m.png"], 2, "bsmap export"),
+        (["run.mcap", "-o", "m.tum"], 2, "written as .bsm"),
+        (["run.mcap", "-o", ""], 2, "name of an output is empty"),
+        (["run.mcap", "-o", "m.bsm", "--traj", "m.svg"], 2, ".tum, .csv, .json, .kitti"),
+        (["run.mcap", "-o", "m.bsm", "--z-min", "nan"], 2, "finite"),
+        (["run.mcap", "-o", "m.bsm", "--z-min", "2", "--z-max", "1"], 2, "no height"),
+        (["run.mcap", "-o", "m.bsm", "--laser-pose", "1,2"], 2, "0.2,0,90"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(arguments, code, words, here):

@@ -78,3 +78,16 @@ def test_no_picture_in_json(here):
     ran = bsmap("stats", "map.bsm", "--json", "--picture", cwd=here)
     assert ran.returncode == 2
     assert "--picture does not go with --json" in message(ran)
+
+
+def test_a_map_that_draws_nothing(tmp_path):
+    """As a log of scans without returns leaves it."""
+    row = "1,0,0.01," + ",".join(["nan"] * 100)
+    columns = "t,angle_min,angle_increment," + ",".join(f"r{i}" for i in range(100))
+    (tmp_path / "blind.csv").write_text(f"{columns}\n{row}\n")
+    made = bsmap("slam", "blind.csv", "-o", "empty.bsm", cwd=tmp_path)
+    assert b"the map is empty" in made.stderr
+    ran = bsmap("stats", "empty.bsm", cwd=tmp_path)
+    assert ran.returncode == 0
+    assert b"nothing is drawn" in ran.stdout
+    assert b"too large" not in ran.stdout

@@ -68,6 +68,18 @@ def test_a_good_log_has_no_findings(tmp_path):
     assert set(findings(tmp_path, a_drive(odometry=False))) == {"odometry"}
 
 
+@pytest.mark.parametrize("limit", [math.inf, 30_000.0])
+def test_millimetres(tmp_path, limit):
+    scans = [
+        dataclasses.replace(scan, ranges_m=scan.ranges_m * np.float32(1000), range_max_m=limit)
+        for scan in a_drive()
+    ]
+    found = findings(tmp_path, scans)["units"]
+    assert found.level == "problem"
+    assert "millimetres" in found.remedy
+    assert 3000 < found.value < 8000
+
+
 @pytest.mark.parametrize(("odometry", "level"), [(True, "warning"), (False, "problem")])
 def test_gaps(tmp_path, odometry, level):
     scans = a_drive(odometry=odometry)

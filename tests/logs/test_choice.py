@@ -1,6 +1,7 @@
 """Which topics, which laser's place, which part of a log."""
 
 import math
+import shlex
 
 import numpy as np
 import pytest
@@ -60,6 +61,21 @@ def test_two_topics_are_the_users_choice(tmp_path):
         assert {scan.topic for scan in found} == {"/rear/scan"}
     found, _ = read(path, topics=("/front/scan", "/rear/scan"))
     assert [scan.topic for scan in found[:4]] == ["/front/scan", "/rear/scan"] * 2
+
+
+def test_flags_to_choose_with_are_ready_for_a_shell(tmp_path):
+    topics = ["/my scan", "/it's", *(f"/s{i:03d}" for i in range(40))]
+    path = tmp_path / "log.mcap"
+    path.write_bytes(ros_mcap([message for t in topics for message in on(t, count=1)], ROS))
+    with pytest.raises(UsageError) as caught:
+        read(path)
+    _, *flags, last = str(caught.value).splitlines()
+    said = [shlex.split(line) for line in flags]
+    assert all(flag == "--topic" and topic in topics for flag, topic in said)
+    assert ["--topic", "/my scan"] in said
+    assert ["--topic", "/it's"] in said
+    assert len(str(caught.value)) < 600
+    assert f"{len(topics) - len(flags)} more" in last
 
 
 def test_a_place_that_comes_late(tmp_path):

@@ -240,6 +240,49 @@ def test_rows_as_people_write_them(tmp_path):
     assert report.scans_skipped == 0
 
 
+@pytest.mark.parametrize(
+    "respelt",
+    [
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t").replace(".", ","),
+        lambda text: "\n".join(
+            ",".join(f'"{cell.replace(".", ",")}"' for cell in line.split(","))
+            for line in text.splitlines()
+        ),
+        lambda text: "\ufeff" + text.replace("\n", "\r\n").replace(",", ";"),
+    ],
+    ids=["semicolons", "decimal commas", "tabs", "quotes", "a spreadsheet's"],
+)
+def test_csv_as_spreadsheets_write_it(tmp_path, respelt):
+    text = csv(SCANS).decode().partition("\n")[2]
+    found, _ = read(written(tmp_path, respelt(text) + "\n"))
+    assert_same(found, SCANS)
+
+
+def test_what_is_no_number_is_said_plainly(tmp_path):
+    lines = csv(SCANS).decode().splitlines()
+    lines[3] = "nan" + lines[3][lines[3].index(",") :]
+    found, report = read(written(tmp_path, "\n".join(lines) + "\n"))
+    assert len(found) == len(SCANS) - 1
+    said = " ".join(report.warnings)
+    assert "line 4 of log: 'nan' is no whole number" in said
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        ("t;r0;r1\n1;2;3\n".encode("utf-16"), "save it as UTF-8"),
+        (b"\x89BSM\r\n\x1a\n", "a map and no log"),
+        (b"PK\x03\x04 and so on", "unpack it"),
+        (b"1.0,2.0,3.0\n", "a header row"),
+    ],
+)
+def test_what_is_no_log_is_told_by_what_it_is(tmp_path, data, says):
+    with pytest.raises(LogError, match=says):
+        read(written(tmp_path, data))
+
+
 def test_angles_from_the_command_line(tmp_path):
     path = written(tmp_path, "t,r0,r1,r2\n1,1,2,3\n")
     with pytest.raises(UsageError, match="--angle-min"):

@@ -186,3 +186,22 @@ def test_noise_is_not_settled_by_where_a_log_begins():
 @pytest.mark.parametrize("ranges", [[], [1.0], [np.nan] * 500, [1.0] * 20])
 def test_noise_of_too_few_returns_is_unknown(ranges):
     assert estimate_range_sigma(scan_of(ranges), DEFAULT, STEP) is None
+
+
+@pytest.mark.parametrize(
+    ("sector", "left"),
+    [
+        ((10.0, 20.0), 350),
+        ((-10.0, 10.0), 340),
+        ((350.0, 10.0), 340),
+        ((10.0, -10.0), 20),
+        ((0.0, 360.0), 0),
+        ((-180.0, 180.0), 0),
+        ((0.0, 720.0), 0),
+        ((30.0, 30.0), 360),
+    ],
+)
+def test_beams_in_a_sector_are_ignored(sector, left):
+    scan = scan_of([2.0] * 360, -179.5)
+    settings = SensorSettings(ignore_angles_deg=(sector,))
+    assert len(find_returns(scan, settings, STEP)) == left

@@ -85,14 +85,14 @@ class TalkFlags:
         return Talk(level=-1 if self.quiet and not self.verbose else self.verbose, color=self.color)
 
 
-def numbers(name: str, text: str, count: int) -> list[float]:
-    """`count` finite numbers separated by commas; UsageError otherwise."""
+def numbers(name: str, text: str, example: str) -> list[float]:
+    """As many finite numbers, separated by commas, as the example has; UsageError otherwise."""
+    count = example.count(",") + 1
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
         values = []
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        example = ",".join(["0.1", "30", "0", "1"][:count])
         raise UsageError(f"{name} {text}: give {count} numbers with commas, such as {example}")
     return values
 
@@ -101,7 +101,7 @@ def box(text: str | None) -> tuple[float, float, float, float] | None:
     """The box x0, y0, x1, y1 [m] of --clip; UsageError where it is none."""
     if text is None:
         return None
-    x0, y0, x1, y1 = numbers("--clip", text, 4)
+    x0, y0, x1, y1 = numbers("--clip", text, "0,0,4,3")
     if x0 >= x1 or y0 >= y1:
         raise UsageError(f"--clip {text}: give the lower left corner, then the upper right one")
     return x0, y0, x1, y1

@@ -150,10 +150,16 @@ class ReadFlags:
             "--duration": self.duration,
             "--angle-min": self.angle_min,
             "--angle-increment": self.angle_increment,
+            "--z-min": self.z_min,
+            "--z-max": self.z_max,
         }
         for flag, value in given.items():
             if value is not None and not math.isfinite(value):
                 raise UsageError(f"{flag} {value}: give a finite number")
+        if self.z_min is not None and self.z_max is not None and self.z_min > self.z_max:
+            raise UsageError(
+                f"no height lies between --z-min {self.z_min} and --z-max {self.z_max}"
+            )
 
     def _end_s(self) -> float | None:
         if self.duration is None:
@@ -174,5 +180,5 @@ def parse_laser_pose(text: str | None) -> tuple[SE2 | None, bool]:
     if text is None:
         return None, False
     flipped = text.endswith(",flip")
-    x, y, yaw_deg = numbers("--laser-pose", text.removesuffix(",flip"), 3)
+    x, y, yaw_deg = numbers("--laser-pose", text.removesuffix(",flip"), "0.2,0,90")
     return SE2.from_array((x, y, math.radians(yaw_deg))), flipped

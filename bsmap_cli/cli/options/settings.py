@@ -78,9 +78,9 @@ class SensorFlags:
         """The same as `key=value` overrides."""
         given = []
         if self.range_ is not None:
-            near, far = numbers("--range", self.range_, 2)
+            near, far = numbers("--range", self.range_, "0.1,30")
             given += [f"sensor.range_min_m={near!r}", f"sensor.range_max_m={far!r}"]
         if self.ignore_angles:
-            pairs = [numbers("--ignore-angles", pair, 2) for pair in self.ignore_angles]
+            pairs = [numbers("--ignore-angles", pair, "80,100") for pair in self.ignore_angles]
             given.append(f"sensor.ignore_angles_deg={pairs}")
         return tuple(given)

@@ -7,6 +7,7 @@ from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import Json, Logs, ReadFlags, Strict, TalkFlags
 from bsmap_cli.cli.report import print_json, print_text
 from bsmap_cli.cli.talk import RED, YELLOW, harmless
+from bsmap_cli.logs.finding import counted
 
 
 def run(
@@ -17,7 +18,7 @@ def run(
     strict: Strict = False,
     json: Json = False,
 ) -> int:
-    """Read a log through and tell what is wrong with it, each finding with its remedy.
+    """Read a log through and tell what is wrong, each with its remedy.
 
     Looked for: gaps, stamps that are zero, repeat or step back, clocks that are apart or were set,
     changing beam counts, beams without return or on the robot itself, a laser that is tilted, moves
@@ -31,7 +32,6 @@ def run(
     from dataclasses import asdict
 
     from bsmap_cli.logs.check import check_log
-    from bsmap_cli.logs.finding import counted
     from bsmap_cli.logs.open_log import open_log
 
     voice = talk.talk()

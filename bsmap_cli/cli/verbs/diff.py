@@ -70,7 +70,7 @@ def run(
 def _rows(difference: MapDifference) -> list[tuple[str, str]]:
     pose = difference.pose_a_b
     return [
-        ("B in A", f"{pose.x:.3f}, {pose.y:.3f} m, {math.degrees(pose.theta):.2f} degrees"),
+        ("B in A", f"{pose.x:z.3f}, {pose.y:z.3f} m, {math.degrees(pose.theta):z.2f} degrees"),
         ("common", f"{difference.common_m:.1f} m of wall, RMS {1e3 * difference.rms_m:.1f} mm"),
         ("added", f"{difference.added_m:.1f} m"),
         ("removed", f"{difference.removed_m:.1f} m"),

@@ -50,7 +50,7 @@ def run(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Judge a trajectory by a reference, or by relations between its poses.
+    """Judge a trajectory by a reference, or by relations of its poses.
 
     With REF: the absolute error after a rigid alignment by least squares (ATE), and the error of
     motions of --delta metres (RPE). With --relations: the metric of Kuemmerle et al. 2009, the
@@ -95,7 +95,8 @@ def _against_reference(
 ) -> dict[str, Any]:
     from bsmap_cli.evaluation.trajectory_error import absolute_error, match_poses, relative_error
 
-    matched = match_poses(read_trajectory(estimate), read_trajectory(reference), max_dt_s=max_dt_s)
+    judged, truth = read_trajectory(estimate), read_trajectory(reference)
+    matched = match_poses(judged, truth, max_dt_s=max_dt_s)
     absolute = absolute_error(matched)
     if picture is not None:
         picture.draw(absolute)
@@ -103,6 +104,7 @@ def _against_reference(
         "ate": absolute.as_json(),
         "rpe": relative_error(matched, delta_m=delta_m).as_json(),
         "matched": len(matched.stamps_ns),
+        "poses": len(judged),
     }
 
 
@@ -132,4 +134,4 @@ def _rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     else:
         rpe_text = f"{rpe['rmse_m']:.4f} m rmse, {rpe['rmse_deg']:.3f} deg rmse"
         rows.append((f"RPE per {rpe['per']}", rpe_text))
-    return [*rows, ("matched", f"{report['matched']} poses")]
+    return [*rows, ("matched", f"{report['matched']} of {report['poses']} poses")]

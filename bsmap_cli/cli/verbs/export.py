@@ -83,7 +83,9 @@ def run(
     replay: ReplayFlags,
     force: Force = False,
 ) -> None:
-    """Write a map in the format of another program, known from the extension of the output.
+    """Write a map in the format of another program.
+
+    The extension of the output tells the format, or --format.
 
     \b
     Formats:
@@ -159,7 +161,7 @@ def _selection(document: MapDocument, part: PartFlags) -> Selection:
 def _origin(text: str | None) -> GeoOrigin | None:
     from bsmap_cli.exchange.geodesy import GeoOrigin
 
-    return None if text is None else GeoOrigin(*numbers("--origin", text, 3))
+    return None if text is None else GeoOrigin(*numbers("--origin", text, "48.137,11.575,30"))
 
 
 def _write_bsm(target: Output, document: MapDocument, part: PartFlags) -> None:

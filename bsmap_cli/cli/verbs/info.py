@@ -8,7 +8,7 @@ from bsmap_cli.cli.report import print_json, print_rows, print_table
 
 
 def run(*, talk: TalkFlags, read: ReadFlags, logs: Logs = None, json: Json = False) -> None:
-    """Show the topics, rates and frames of a log, and what `slam` would take from it.
+    """Show topics, rates and frames of a log, and what `slam` takes.
 
     \b
     Example:

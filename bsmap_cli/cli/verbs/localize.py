@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Annotated, Any
 
+from bsmap_cli.cli.formats import refuse_no_trajectory
 from bsmap_cli.cli.inputs import STDIN, log_sources, read_map_file
 from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import (
@@ -22,6 +23,7 @@ from bsmap_cli.cli.options import (
 from bsmap_cli.cli.outputs import STDOUT, Outputs, write_trajectory
 from bsmap_cli.cli.report import print_json
 from bsmap_cli.errors import UsageError
+from bsmap_cli.logs.finding import counted
 
 
 def run(
@@ -39,7 +41,7 @@ def run(
     strict: Strict = False,
     json: Json = False,
 ) -> int:
-    """Tell where the robot was in a saved map; where it started is not known.
+    """Tell where the robot was in a saved map, its start unknown.
 
     What the robot sees is searched for in the whole map, all positions and headings, until one
     place alone fits; then each scan is followed from the last. Where the map no longer fits, the
@@ -64,6 +66,7 @@ def run(
         raise UsageError("--json and an output on standard output do not go together: name a file")
     with Outputs(force=force, inputs=(*sources, map_)) as outputs:
         target = outputs.add(traj) if traj is not None else None
+        refuse_no_trajectory(traj)
         chosen = settings.settings(sensor.overrides())
         document, _ = read_map_file(map_)
         options = read.options()
@@ -88,6 +91,6 @@ def run(
 
 def _summary(report: dict[str, Any]) -> str:
     return (
-        f"{report['scans']} scans, found after {report['converged_after_scans']}, "
+        f"{counted(report['scans'], 'scan')}, found after {report['converged_after_scans']}, "
         f"{report['lost']} lost, {report['seconds']:.1f} s"
     )

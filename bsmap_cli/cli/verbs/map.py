@@ -57,4 +57,5 @@ def run(
     if STDIN in sources and STDIN in beside:
         raise UsageError("log and poses cannot both come from standard input: name one of them")
     log = LogFlags(logs=sources, beside=beside, read=read, settings=settings, sensor=sensor)
-    return make_map(work, log, making, talk.talk())
+    file = None if poses == "odom" else poses
+    return make_map(work, log, making, talk.talk(), poses=file)

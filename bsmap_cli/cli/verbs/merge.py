@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from bsmap_cli.cli.formats import refuse_no_map
 from bsmap_cli.cli.options import Force, SettingsFlags, TalkFlags, option
 from bsmap_cli.cli.outputs import Outputs
 from bsmap_cli.cli.placing import At, FirstMap, SecondMap, placed, read_two
@@ -48,6 +49,7 @@ def run(
     voice = talk.talk()
     with Outputs(force=force, inputs=(a, b)) as outputs:
         target = outputs.add(output, binary=True)
+        refuse_no_map(output)
         first, second = read_two(a, b)
         chosen = settings.settings()
         placement = placed(first, second, at, chosen, voice)

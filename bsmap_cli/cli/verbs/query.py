@@ -55,7 +55,7 @@ def run(
     ] = math.inf,
     json: Json = False,
 ) -> None:
-    """Ask a map: which point of a curve is nearest, what a ray meets, how far the next wall is.
+    """Ask a map for the nearest wall, what a ray meets, how far it is.
 
     Points are arguments, or rows of CSV on standard input, with or without a header of the
     columns x, y and angle_deg. Answers are CSV, a row a point, in the same order. A side is `free`

@@ -9,6 +9,7 @@ from bsmap_cli.cli.inputs import log_sources
 from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import Force, Logs, ReadFlags, Strict, TalkFlags, option
 from bsmap_cli.cli.outputs import Outputs
+from bsmap_cli.logs.finding import counted
 
 
 def run(
@@ -29,7 +30,7 @@ def run(
     force: Force = False,
     strict: Strict = False,
 ) -> int:
-    """Write the scans of a log, with odometry and the laser's place, in another format.
+    """Write the scans of a log, with odometry, in another format.
 
     Ranges are written as they were read; scans that cannot be read are left out and counted.
 
@@ -51,5 +52,5 @@ def run(
             tell_warnings(reader.report, voice)
             losses = reading_losses(reader.report)
         code = exit_code(losses, strict=strict, talk=voice)
-    voice.note(f"{count} scans written")
+    voice.note(f"{counted(count, 'scan')} written")
     return code

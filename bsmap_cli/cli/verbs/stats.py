@@ -33,7 +33,7 @@ def run(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Show the size of a map, its curves and control points, beside a grid of the same place.
+    """Show what a map holds and its size, beside a grid of the place.
 
     The payload is what the curves of the finest level take: 16 bytes a curve, 8 a knot vector
     and 9 a control point where they are not compressed. The grid has cells of 5 cm and one byte
@@ -76,14 +76,19 @@ def run(
 def _rows(statistics: MapStatistics) -> list[tuple[str, str]]:
     per_point, bounds = statistics.bytes_per_control_point, statistics.bounds_m
     per_metre = statistics.payload_bytes / statistics.length_m if statistics.length_m else None
-    return [
+    rows = [
         ("file", size(statistics.file_bytes)),
         ("payload", f"{size(statistics.payload_bytes)}{_of(per_metre, 'B a metre of wall')}"),
         ("path", size(statistics.path_bytes)),
         ("curves", f"{statistics.curves} of degree {statistics.degree}"),
         ("control points", f"{statistics.control_points}{_of(per_point, 'B each')}"),
         ("length", f"{statistics.length_m:.1f} m of wall"),
-        ("extent", _extent(bounds) if bounds else "nothing is drawn"),
+    ]
+    if bounds is None:
+        return [*rows, ("extent", "nothing is drawn")]
+    return [
+        *rows,
+        ("extent", _extent(bounds)),
         ("redundancy", f"{statistics.redundancy:.3f}"),
         ("5 cm grid", _grid(statistics.grid_5cm_bytes, statistics.ratio_to_grid_5cm)),
         ("  as PNG", _grid(statistics.grid_5cm_png_bytes, statistics.ratio_to_png)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from bsmap_cli.cli.formats import PAGE_EXTENSIONS, refuse_extension
 from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
 from bsmap_cli.cli.options import Force, MapIn, TalkFlags, option
 from bsmap_cli.cli.outputs import Outputs
@@ -29,7 +30,7 @@ def run(
     replay: ReplayFlags,
     force: Force = False,
 ) -> None:
-    """Write a map as one self-contained page: pan, zoom, hover, measure, play the path.
+    """Write a map as one page for a browser: zoom, measure, play.
 
     The page needs no network. With --log and --traj it shows the scan at each pose.
 
@@ -45,6 +46,7 @@ def run(
     inputs = [path for path in (source, traj, replay.log) if path is not None]
     with Outputs(force=force, inputs=inputs) as outputs:
         target = outputs.add(output)
+        refuse_extension(output, PAGE_EXTENSIONS, "the page is HTML: end the name in .html")
         document, _ = read_map_file(source)
         trajectory = read_trajectory(traj) if traj is not None else None
         selection = select(document, level=level, trajectory=trajectory)

@@ -10,7 +10,7 @@ from bsmap_cli.cli.report import print_json, print_text
 
 
 def run(*, talk: TalkFlags, json: Json = False) -> None:
-    """Compile the inner loops for this machine, so that the first run need not.
+    """Compile the inner loops ahead, so that the first run need not.
 
     For images, CI and shared machines. Compiled code is kept beside the package, or where that
     cannot be written in the user's cache folder; the environment variable NUMBA_CACHE_DIR names

@@ -3,7 +3,7 @@
 const canvas = $("map"), context = canvas.getContext("2d");
 const view = { x: 0, y: 0, scale: 40, width: 1, height: 1 }; // centre [m], pixels a metre
 const shown = { path: true, points: false, normals: false, scan: true };
-let colours = {}, waiting = false;
+let colours = {}, waiting = false, fitted = null;
 
 const toX = (x) => (x - view.x) * view.scale + view.width / 2;
 const toY = (y) => view.height / 2 - (y - view.y) * view.scale;
@@ -39,11 +39,12 @@ function mapBox() {
 
 function fit() { // into what the panel and the footer leave free
   const [x0, y0, x1, y1] = mapBox(), panel = $("panel").offsetWidth;
-  const beside = view.width > 3 * panel ? panel + 12 : 0;
+  const beside = panel && view.width > 3 * panel ? panel + 12 : 0;
   const width = Math.max(view.width - beside, 50), height = Math.max(view.height - 150, 50);
   view.scale = 0.94 * Math.min(width / Math.max(x1 - x0, 1e-3), height / Math.max(y1 - y0, 1e-3));
   view.x = (x0 + x1 + beside / view.scale) / 2;
   view.y = (y0 + y1) / 2 - 20 / view.scale;
+  fitted = { x: view.x, y: view.y, scale: view.scale };
   redraw();
 }
 
@@ -54,7 +55,9 @@ function resize() {
   canvas.width = Math.round(view.width * ratio);
   canvas.height = Math.round(view.height * ratio);
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  redraw();
+  const asFitted = fitted && Object.keys(fitted).every((key) => view[key] === fitted[key]);
+  if (asFitted) fit(); // a turned phone still shows the whole map
+  else redraw();
 }
 
 function readColours() {
