@@ -304,6 +304,28 @@ def test_a_phone_sees_the_map_and_opens_the_panel(browser, tmp_path, width, heig
 
 
 @needs_browser
+def test_a_phone_that_is_turned_fits_the_map_anew(browser, tmp_path):
+    (tmp_path / "page.html").write_bytes(page(room_document(), trajectory=walk()))
+    upright = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+    across = {**upright, "width": 844, "height": 390}
+    try:
+        browser.call("Emulation.setDeviceMetricsOverride", **across)
+        browser.open((tmp_path / "page.html").as_uri())
+        browser.call("Emulation.setDeviceMetricsOverride", **upright)
+        browser.wait("bsmap.view.width === 390")
+        turned = browser.value("bsmap.view.scale")
+        browser.value("bsmap.fit()")
+        assert turned == browser.value("bsmap.view.scale")
+        browser.value("bsmap.zoomAt(100, 100, 2)")  # the user looks elsewhere: left alone
+        scale = browser.value("bsmap.view.scale")
+        browser.call("Emulation.setDeviceMetricsOverride", **across)
+        browser.wait("bsmap.view.width === 844")
+        assert browser.value("bsmap.view.scale") == scale
+    finally:
+        browser.call("Emulation.clearDeviceMetricsOverride")
+
+
+@needs_browser
 def test_100_000_control_points_are_drawn_and_moved(browser, tmp_path):
     step = np.arange(100) * 0.1
     curves = [
