@@ -5,7 +5,11 @@ raise; products may be fused with sums.
 
 Each time compiled code takes an array out of a map level, numba counts one more reference to it,
 by an atomic addition that costs as much as a foot point. What runs point by point is therefore
-compiled without counting (`inlined`, `lean`) and must not allocate.
+compiled without counting (`inlined`, `lean`, `lean_part`) and must not allocate.
+
+What only compiled code calls (`inlined`, `part`, `lean_part`) is compiled without the code by
+which Python would call it: for a map level that code is longer than most loops. Called from
+Python, such a function runs as it is written, slowly.
 """
 
 from __future__ import annotations
@@ -13,13 +17,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, types
+from numba.core.typing.templates import infer_global
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
 # `_nrt=False` leaves numba's reference counting out: known to its compiler, not to its stubs
-_RULES = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
+_RULES = {
+    "cache": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,
+}
+
+PARTS: list[Any] = []
+"""What numba made of the parts: it holds them by weak references only."""
 
 
 def kernel(function: Function) -> Function:
@@ -32,11 +45,28 @@ def lean(function: Function) -> Function:
     return _compile(function, _nrt=False)
 
 
+def part(function: Function) -> Function:
+    """Compile a function that only compiled code calls."""
+    return _compile_part(function)
+
+
+def lean_part(function: Function) -> Function:
+    """The same for a loop that allocates nothing."""
+    return _compile_part(function, _nrt=False)
+
+
 def inlined(function: Function) -> Function:
     """The same for what is done for one point, compiled into the loop that calls it."""
-    return _compile(function, _nrt=False, forceinline=True)
+    return _compile_part(function, _nrt=False, forceinline=True)
 
 
 def _compile(function: Function, **options: bool) -> Function:
     rules: dict[str, Any] = {**_RULES, **options}
     return cast(Function, njit(**rules)(function))
+
+
+def _compile_part(function: Function, **options: bool) -> Function:
+    compiled = _compile(function, no_cpython_wrapper=True, **options)
+    PARTS.append(compiled)
+    infer_global(function, types.Dispatcher(compiled))  # type: ignore[no-untyped-call]
+    return function

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from bsmap_cli.geometry.compiled import lean
+from bsmap_cli.geometry.compiled import lean_part
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 
 
-@lean
+@lean_part
 def curve_jet(
     points: Points, first: int, matrix: Points, u: float, polynomial: Points
 ) -> tuple[float, float, float, float]:

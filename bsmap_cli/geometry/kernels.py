@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel, lean
+from bsmap_cli.geometry.compiled import inlined, lean_part, part
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def foot_point(
     return row, min(1.0, max(0.0, f))
 
 
-@lean
+@lean_part
 def solve_banded(band: Array, rhs: Array) -> bool:
     """Solve a symmetric positive definite banded system in place by Cholesky.
 
@@ -140,13 +140,13 @@ def solve_banded(band: Array, rhs: Array) -> bool:
     return True
 
 
-@kernel
+@part
 def symmetric_eigen3(matrix: Array, values: Array, vectors: Array) -> None:  # noqa: PLR0912
     """Eigenvalues (ascending) and eigenvectors (columns) of a symmetric 3 x 3 matrix, by Jacobi."""
     a = matrix.copy()
-    vectors[:] = 0.0
     for i in range(3):
-        vectors[i, i] = 1.0
+        for j in range(3):
+            vectors[i, j] = 1.0 if i == j else 0.0
     for _ in range(8):
         off = abs(a[0, 1]) + abs(a[0, 2]) + abs(a[1, 2])
         if off <= 1e-14 * (abs(a[0, 0]) + abs(a[1, 1]) + abs(a[2, 2])):

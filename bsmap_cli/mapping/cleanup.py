@@ -46,10 +46,15 @@ def sample_curve(
         tangents[j, 0], tangents[j, 1] = dx / norm, dy / norm
 
 
-@kernel
-def _mean_weight(level: LevelArrays, curve: int) -> float:
-    offset = level.offset[curve]
-    return float(np.mean(level.weights[offset : offset + level.count[curve]]))
+@lean
+def _weigh_curves(level: LevelArrays, heaviness: Vector) -> None:
+    """Mean weight of each curve times its length [lattice units]."""
+    for c in range(len(heaviness)):
+        total = 0.0
+        for row in range(level.offset[c], level.offset[c] + level.count[c]):
+            total += level.weights[row]
+        length = level.support[c, 1] - level.support[c, 0]
+        heaviness[c] = total / level.count[c] * length if level.count[c] > 0 else 0.0
 
 
 @inlined
@@ -108,24 +113,29 @@ def cut_curve(
 
 
 @kernel
-def _absorb(level: LevelArrays, matrix: Points, knot_step_m: float, least: float) -> None:
+def _absorb(
+    level: LevelArrays,
+    matrix: Points,
+    knot_step_m: float,
+    heaviness: Vector,
+    order: NDArray[np.int64],
+    least: float,
+) -> None:
     """Cut from each curve, the lightest first, the ends that heavier ones cover."""
     degree = matrix.shape[0] - 1
-    curves = level.sizes[0]
-    heaviness = np.empty(curves)
-    for c in range(curves):
-        length = level.support[c, 1] - level.support[c, 0]
-        heaviness[c] = _mean_weight(level, c) * length if level.count[c] > 0 else 0.0
-    order = np.argsort(heaviness, kind="mergesort")
-    for curve in order:
+    for i in range(len(order)):
+        curve = order[i]
         if level.count[curve] == 0:
             continue
         start, end = level.support[curve, 0], level.support[curve, 1]
         n = max(2, math.ceil((end - start) * SAMPLES) + 1)
-        u = np.linspace(start, end, n)
-        points, tangents = np.empty((n, 2)), np.empty((n, 2))
+        u, points, tangents = np.empty(n), np.empty((n, 2)), np.empty((n, 2))
+        step = (end - start) / (n - 1)
+        for j in range(n):
+            u[j] = start + j * step if j < n - 1 else end
         sample_curve(level, matrix, curve, u, points, tangents)
-        covered = np.zeros(n, np.bool_)
+        covered = np.empty(n, np.bool_)
+        hidden = 0
         for j in range(n):
             covered[j] = _is_covered(
                 level,
@@ -139,7 +149,8 @@ def _absorb(level: LevelArrays, matrix: Points, knot_step_m: float, least: float
                 tangents[j, 1],
                 degree,
             )
-        if np.mean(covered) > ABSORBED:
+            hidden += covered[j]
+        if hidden / n > ABSORBED:
             cut_curve(level, matrix, knot_step_m, curve, start, start)
             continue
         first, last = 0, n - 1
@@ -268,7 +279,17 @@ def _join_ends(curve_map: CurveMap) -> int:
 def tidy(curve_map: CurveMap, *, min_length: float) -> None:
     """Absorb duplicates and join what follows on, until nothing joins any more."""
     for _ in range(6):
-        _absorb(curve_map.arrays, curve_map.matrix, curve_map.knot_step_m, min_length)
+        heaviness = np.empty(len(curve_map))
+        _weigh_curves(curve_map.arrays, heaviness)
+        order = np.argsort(heaviness, kind="stable")
+        _absorb(
+            curve_map.arrays,
+            curve_map.matrix,
+            curve_map.knot_step_m,
+            heaviness,
+            order,
+            min_length,
+        )
         if not _join_ends(curve_map):
             break
 

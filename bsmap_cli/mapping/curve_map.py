@@ -67,7 +67,8 @@ def refresh_spans(
 def _reindex(level: LevelArrays, matrix: Points, knot_step_m: float) -> None:
     """Fill an empty hash with all usable spans."""
     level.sizes[2] = 0
-    level.span_cell[:] = -1
+    for row in range(len(level.span_cell)):
+        level.span_cell[row] = -1
     for curve in range(level.sizes[0]):
         begin = level.offset[curve]
         refresh_spans(level, matrix, knot_step_m, curve, begin, begin + level.count[curve])

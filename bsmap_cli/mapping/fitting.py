@@ -9,7 +9,7 @@ import numpy as np
 
 from bsmap_cli.errors import FitError
 from bsmap_cli.geometry.basis import basis_matrix
-from bsmap_cli.geometry.compiled import inlined, kernel, lean
+from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part, part
 from bsmap_cli.geometry.curve import Curve
 from bsmap_cli.geometry.kernels import basis_weights, solve_banded
 from bsmap_cli.geometry.se2 import Points, Vector
@@ -57,6 +57,15 @@ def lattice_domain(first_u: float, last_u: float) -> tuple[int, int]:
     return low, max(math.ceil(last_u - SNAP), low + 1)
 
 
+@lean_part
+def least_and_greatest(u: Vector) -> tuple[float, float]:
+    """Of parameters in any order."""
+    least = greatest = u[0]
+    for j in range(1, len(u)):
+        least, greatest = min(least, u[j]), max(greatest, u[j])
+    return least, greatest
+
+
 @lean
 def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
     """Share of one span that each point stands for: half the way to both neighbours, capped."""
@@ -67,7 +76,7 @@ def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
         weights[j] = 0.5 * (before + after)
 
 
-@kernel
+@part
 def fit_rms(
     u: Vector, points: Points, weights: Vector, matrix: Points, first_span: int, fitted: Points
 ) -> float:
@@ -109,8 +118,12 @@ def fit_control_points(  # noqa: PLR0912
     order = matrix.shape[0]
     band = np.zeros((n, max(order, 4)))
     basis, share = np.empty(order), np.zeros(n)
-    solution[:] = 0.0
+    for i in range(n):
+        solution[i, 0] = solution[i, 1] = 0.0
+    mean_x = mean_y = 0.0
     for j in range(len(u)):
+        mean_x += points[j, 0]
+        mean_y += points[j, 1]
         span = min(max(math.floor(u[j]) - first_span, 0), n - order)
         basis_weights(matrix, u[j] - first_span - span, basis)
         for a in range(order):
@@ -123,7 +136,7 @@ def fit_control_points(  # noqa: PLR0912
     largest = 1e-12
     for i in range(n):
         largest = max(largest, band[i, 0])
-    mean_x, mean_y = np.mean(points[:, 0]), np.mean(points[:, 1])
+    mean_x, mean_y = mean_x / len(u), mean_y / len(u)
     for i in range(n):
         pull = (ANCHOR if is_known[i] > 0.0 else RIDGE) * largest
         band[i, 0] += pull
@@ -158,7 +171,7 @@ def fit_control_points(  # noqa: PLR0912
     return solve_banded(band, solution)
 
 
-@kernel
+@part
 def arc_length_parameters(
     u: Vector, control_points: Points, matrix: Points, first_span: int, anchor: int, step_m: float
 ) -> None:

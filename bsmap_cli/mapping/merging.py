@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import inlined, kernel, lean
+from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part, part
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import refresh_spans
@@ -21,6 +21,7 @@ from bsmap_cli.mapping.fitting import (
     fit_control_points,
     fit_rms,
     lattice_domain,
+    least_and_greatest,
 )
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import remove_span
@@ -64,7 +65,7 @@ def has_room(level: LevelArrays, rows: int) -> bool:
     )
 
 
-@lean
+@lean_part
 def _claim_rows(level: LevelArrays, curve: int, first: int, count: int) -> int:
     """Give a curve fresh rows with room at both ends; returns its new offset."""
     slack = max(4, count // 2)
@@ -112,13 +113,14 @@ def extend_rows(level: LevelArrays, curve: int, first: int, end: int) -> bool:
     return bool(moved)
 
 
-@lean
+@lean_part
 def _start_curve(level: LevelArrays, first: int, count: int) -> int:
     """A new curve without observations, eq. (12)."""
     curve = level.sizes[0]
     level.sizes[0] += 1
     offset = _claim_rows(level, curve, first, count)
-    level.weights[offset : offset + count] = 0.0
+    for row in range(offset, offset + count):
+        level.weights[row] = 0.0
     level.support[curve, 0] = math.inf
     level.support[curve, 1] = -math.inf
     level.seen[curve] = 0
@@ -130,7 +132,8 @@ def observed_share(u: Vector, weights: Vector, matrix: Points, low: int, omega: 
     """omega_g = sum_j (ds_j / Delta) B_g(tau_j): 1 inside the data whatever their density."""
     order = matrix.shape[0]
     basis = np.empty(order)
-    omega[:] = 0.0
+    for i in range(len(omega)):
+        omega[i] = 0.0
     for j in range(len(u)):
         span = min(max(math.floor(u[j]) - low, 0), len(omega) - order)
         basis_weights(matrix, u[j] - low - span, basis)
@@ -191,7 +194,7 @@ def merge_fitted(
     return curve
 
 
-@kernel
+@part
 def merge_run(
     level: LevelArrays,
     matrix: Points,
@@ -212,7 +215,7 @@ def merge_run(
     more than `roughest_m`: foliage and clutter are no curves.
     """
     degree = matrix.shape[0] - 1
-    start_u, end_u = np.min(u), np.max(u)
+    start_u, end_u = least_and_greatest(u)
     low, high = lattice_domain(start_u, end_u)
     first, count = low - degree, high - low + degree
     known, is_known = np.zeros((count, 2)), np.zeros(count)
@@ -222,7 +225,7 @@ def merge_run(
             row = shift + i
             inside = level.offset[curve] <= row < level.offset[curve] + level.count[curve]
             if inside and level.weights[row] >= KNOWN_WEIGHT:
-                known[i] = level.points[row]
+                known[i, 0], known[i, 1] = level.points[row, 0], level.points[row, 1]
                 is_known[i] = 1.0
     fitted, omega = np.empty((count, 2)), np.empty(count)
     if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):

@@ -13,6 +13,7 @@ from bsmap_cli.mapping.fitting import (
     arc_length_parameters,
     fit_control_points,
     lattice_domain,
+    least_and_greatest,
     spacing_weights,
 )
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -56,7 +57,8 @@ def run_parameters(
         run_u[j - begin] = run_u[j + 1 - begin] - _advance(points, tangents, j + 1) / knot_step_m
     if known_end - known_begin == n or n < 2:
         return
-    low, high = lattice_domain(np.min(run_u), np.max(run_u))
+    first_u, last_u = least_and_greatest(run_u)
+    low, high = lattice_domain(first_u, last_u)
     count = high - low + matrix.shape[0] - 1
     weights, first_fit = np.empty(n), np.empty((count, 2))
     spacing_weights(run_u, 1.0, weights)
@@ -75,7 +77,8 @@ def run_parameters(
         for j in range(last + 1, n):
             run_u[j] = arc_u[j] + behind
     else:
-        run_u[:] = arc_u
+        for j in range(n):
+            run_u[j] = arc_u[j]
 
 
 @kernel
@@ -103,7 +106,8 @@ def merge_runs(
         run_parameters(
             runs[r], curves, u, points, tangents, matrix, knot_step_m, first_penalty, run_u
         )
-        rows = math.ceil(np.max(run_u) - np.min(run_u)) + 2 * matrix.shape[0]
+        least, greatest = least_and_greatest(run_u)
+        rows = math.ceil(greatest - least) + 2 * matrix.shape[0]
         if curve >= 0:
             rows += level.count[curve]
         if not has_room(level, 2 * rows + 16):
@@ -113,33 +117,22 @@ def merge_runs(
         for j in range(runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]):
             if curves[j] != curve:
                 weights[j - begin] = 0.0
-        merged = merge_run(
-            level,
-            matrix,
-            knot_step_m,
-            curve,
-            run_u,
-            points[begin:end],
-            weights,
-            max_weight,
-            penalty,
-            roughest_m,
-            by_table,
-        )
         known_begin, known_end = runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]
-        if not merged and known_begin < known_end and known_end - known_begin < end - begin:
-            known = slice(known_begin - begin, known_end - begin)
-            merge_run(
+        while True:  # all of the run; where that fits badly, what of it is matched
+            merged = merge_run(
                 level,
                 matrix,
                 knot_step_m,
                 curve,
-                run_u[known],
-                points[known_begin:known_end],
-                weights[known],
+                run_u[begin - runs[r, BEGIN] : end - runs[r, BEGIN]],
+                points[begin:end],
+                weights[begin - runs[r, BEGIN] : end - runs[r, BEGIN]],
                 max_weight,
                 penalty,
                 roughest_m,
                 by_table,
             )
+            if merged or not known_begin < known_end or known_end - known_begin == end - begin:
+                break
+            begin, end = known_begin, known_end
     return len(runs)

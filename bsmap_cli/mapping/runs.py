@@ -8,11 +8,12 @@ is long enough becomes a curve of its own.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.compiled import inlined, lean, lean_part
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
@@ -22,7 +23,7 @@ END_REACH = 3.0  # a run that comes this close to a curve's end may extend it [k
 CURVE, BEGIN, END, KNOWN_BEGIN, KNOWN_END = range(5)
 
 
-@lean
+@lean_part
 def _stretch_length(points: Points, begin: int, end: int) -> float:
     length = 0.0
     for j in range(begin + 1, end):
@@ -38,7 +39,7 @@ def _same_run(u: Vector, points: Points, last: int, j: int, knot_step_m: float) 
     return bool(-0.5 <= advance <= 1.5 * way + 0.5)
 
 
-@lean
+@lean_part
 def _matched_runs(
     curves: NDArray[np.int64],
     u: Vector,
@@ -51,7 +52,7 @@ def _matched_runs(
 ) -> int:
     """Append the runs of matched points of one cluster; short misses inside a run are bridged."""
     first = count
-    last = -1
+    last = begin - 1
     for j in range(begin, end):
         if curves[j] < 0:
             continue
@@ -74,7 +75,7 @@ def _matched_runs(
     for r in range(first, count):
         runs[r, KNOWN_BEGIN] = runs[r, BEGIN]
         runs[r, KNOWN_END] = runs[r, END]
-    return count
+    return int(count)
 
 
 @lean
@@ -90,7 +91,7 @@ def plan_runs(
     runs: NDArray[np.int64],
 ) -> int:
     """Write the runs of all clusters; their number. See the column names above."""
-    count = 0
+    count: Any = np.int64(0)  # 0 as a literal would be compiled for itself
     for c in range(len(starts) - 1):
         begin, end = starts[c], starts[c + 1]
         first = count
@@ -128,4 +129,4 @@ def plan_runs(
                     count += 1
             if r < matched:
                 cursor = runs[r, KNOWN_END]
-    return count
+    return int(count)

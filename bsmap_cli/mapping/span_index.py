@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.compiled import inlined, lean_part
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
 EMPTY = -(2**62)
@@ -48,7 +48,7 @@ def remove_span(level: LevelArrays, row: int) -> None:
     level.span_cell[row] = -1
 
 
-@lean
+@lean_part
 def insert_span(level: LevelArrays, row: int, knot_step_m: float) -> None:
     """Put a span into the cell of its middle, leaving the one it was in."""
     column = math.floor(level.spans[row, 0] / knot_step_m)

@@ -14,12 +14,12 @@ the update, which throws the first observation away, and row 3 takes the weight 
 
 from __future__ import annotations
 
-from bsmap_cli.geometry.compiled import lean
+from bsmap_cli.geometry.compiled import lean_part
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
 
-@lean
+@lean_part
 def merge_by_table(
     level: LevelArrays,
     curve: int,

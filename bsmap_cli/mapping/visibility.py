@@ -9,12 +9,12 @@ before them.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel
+from bsmap_cli.geometry.compiled import inlined, kernel, part
 from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -77,11 +77,12 @@ def _sector(x: float, y: float) -> int:
     return min(SECTORS - 1, int(turn * (SECTORS / 4.0)))
 
 
-@kernel
+@part
 def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
     """(WIDTHS, SECTORS) the longest beam within 2^w sectors to either side; -1 without any."""
-    farthest = np.full((WIDTHS, SECTORS), -1.0)
-    sectors = np.full(SECTORS, -1.0)
+    farthest, sectors = np.empty((WIDTHS, SECTORS)), np.empty(SECTORS)
+    for s in range(SECTORS):
+        sectors[s] = -1.0
     cos, sin = math.cos(first_rad), math.sin(first_rad)
     turn_cos, turn_sin = math.cos(step_rad), math.sin(step_rad)
     for b in range(len(ranges)):
@@ -99,7 +100,7 @@ def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
     return farthest
 
 
-@kernel
+@part
 def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     """Does any beam come near a part of a curve that lies round (x, y)?"""
     vx, vy = x - fan.x, y - fan.y
@@ -115,7 +116,7 @@ def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     return bool(fan.farthest[w, _sector(vx, vy)] > r - 2.0 * radius_m)
 
 
-@kernel
+@part
 def _judge_beams(
     fan: Fan,
     centre: float,
@@ -162,7 +163,7 @@ def _judge_beams(
     return DARK if dark > 0 else UNSEEN
 
 
-@kernel
+@part
 def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[int, float, float]:
     """UNSEEN, HIT, MISS or DARK; cosine of the incidence; distance [m]."""
     vx, vy = spans[row, 0] - fan.x, spans[row, 1] - fan.y
@@ -193,13 +194,6 @@ def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[
 
 
 @kernel
-def _longer(column: NDArray[Any], size: int) -> NDArray[Any]:
-    longer = np.empty(size, column.dtype)
-    longer[: len(column)] = column
-    return longer
-
-
-@kernel
 def _judge_level(
     level: LevelArrays,
     degree: int,
@@ -209,8 +203,9 @@ def _judge_level(
     ranges: Ranges,
     reach_m: float,
     sigma_m: float,
-) -> Look:
-    """Judge all spans that the beams may reach; laser as in `Fan`."""
+    look: Look,
+) -> int:
+    """Judge all spans that the beams may reach, and write of how many; laser as in `Fan`."""
     farthest = _farthest(laser[2], step_rad, ranges)
     fan = Fan(
         laser[0],
@@ -225,9 +220,6 @@ def _judge_level(
         farthest,
         sigma_m,
     )
-    most = 256
-    rows, verdicts = np.empty(most, np.int32), np.empty(most, np.int8)
-    cosines, distances = np.empty(most, np.float32), np.empty(most, np.float32)
     count = 0
     radius = 0.5 * (GROUP + degree + 2) * knot_step_m
     for curve in range(level.sizes[0]):
@@ -238,26 +230,17 @@ def _judge_level(
             middle = (begin + end + degree) // 2
             if not _in_sight(level.points[middle, 0], level.points[middle, 1], radius, fan):
                 continue
-            if count + GROUP > most:
-                most *= 2
-                rows, verdicts = _longer(rows, most), _longer(verdicts, most)
-                cosines, distances = _longer(cosines, most), _longer(distances, most)
             for row in range(begin, end):
                 if level.span_cell[row] < 0:
                     continue
                 verdict, cosine, r = _judge_span(level.spans, row, fan, knot_step_m)
                 if verdict != UNSEEN:
-                    rows[count] = row
-                    verdicts[count] = verdict
-                    cosines[count] = cosine
-                    distances[count] = r
+                    look.rows[count] = row
+                    look.verdicts[count] = verdict
+                    look.cosines[count] = cosine
+                    look.ranges_m[count] = r
                     count += 1
-    return Look(
-        rows[:count].copy(),
-        verdicts[:count].copy(),
-        cosines[:count].copy(),
-        distances[:count].copy(),
-    )
+    return count
 
 
 def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: float) -> Look:
@@ -268,7 +251,14 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
     laser = np.array(
         [x + cos * lx - sin * ly, y + sin * lx + cos * ly, wrap_angle(theta + bearing)]
     )
-    look: Look = _judge_level(
+    most = int(curve_map.arrays.sizes[1])
+    room = Look(
+        np.empty(most, np.int32),
+        np.empty(most, np.int8),
+        np.empty(most, np.float32),
+        np.empty(most, np.float32),
+    )
+    count = _judge_level(
         curve_map.arrays,
         curve_map.degree,
         curve_map.knot_step_m,
@@ -277,5 +267,11 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
         sight.ranges_m,
         sight.reach_m,
         sigma_m,
+        room,
     )
-    return look
+    return Look(
+        room.rows[:count].copy(),
+        room.verdicts[:count].copy(),
+        room.cosines[:count].copy(),
+        room.ranges_m[:count].copy(),
+    )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bsmap_cli.config import load_settings
+from bsmap_cli.geometry.compiled import PARTS
 from bsmap_cli.logs.reader import LogInfo, LogReader, ReadReport
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.pipeline.localize import run_localize
@@ -45,6 +46,7 @@ def warm_up() -> WarmUp:
 
 def compiled_functions() -> Iterator[Any]:
     """The dispatchers of numba in the modules that are loaded."""
+    yield from PARTS
     seen = set()
     for name, module in sorted(sys.modules.items()):
         if name.split(".")[0] != "bsmap_cli":

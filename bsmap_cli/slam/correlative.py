@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel, lean
+from bsmap_cli.geometry.compiled import inlined, kernel, lean_part, part
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.slam.likelihood import Likelihood
 
@@ -36,7 +36,7 @@ def _channel(tx: float, ty: float) -> int:
     return 1 if tx > -ty else 2 if ty > tx else 3
 
 
-@lean
+@lean_part
 def _project(
     points: Points,
     tangents: Points,
@@ -75,7 +75,7 @@ def _project(
     return safe
 
 
-@lean
+@lean_part
 def _score(
     grids: NDArray[np.uint8],
     height: int,
@@ -99,7 +99,7 @@ def _score(
     return total / (255.0 * len(cells))
 
 
-@kernel
+@part
 def _descend(
     grids: NDArray[np.uint8],
     cells: Integers,
@@ -133,7 +133,7 @@ def _descend(
         if h == 0:
             if (x - barred[0]) ** 2 + (y - barred[1]) ** 2 < barred[2] ** 2:
                 continue
-            score = _score(grids, 0, cells, places, safe, x, y)
+            score = _score(grids, h, cells, places, safe, x, y)
             if score > best:
                 best, found, found_x, found_y = score, score, x, y
             continue
@@ -159,7 +159,7 @@ def _descend(
 
 
 @kernel
-def _search(
+def _bound(
     grids: NDArray[np.uint8],
     points: Points,
     tangents: Points,
@@ -168,17 +168,15 @@ def _search(
     y: float,
     reach: int,
     cell_m: float,
-    floor: float,
-    barred: Points,
-) -> tuple[float, int, int, int]:
-    """Best score above `floor`, or -1, its angle index and translation; likely blocks first."""
+    cells: Integers,
+    places: Places,
+    safe: Integers,
+    bounds: Points,
+) -> None:
+    """Cells and places of the points at each angle; what no shift within a block can exceed."""
     top = grids.shape[0] - 1
     block = 1 << top
-    cells = np.empty((len(angles), len(points), 3), np.int64)
-    places = np.empty((len(angles), len(points)), np.int32)
-    safe = np.empty(len(angles), np.int64)
     blocks = (2 * reach + 1 + block - 1) // block
-    bounds = np.empty(len(angles) * blocks * blocks)
     for a in range(len(angles)):
         safe[a] = _project(
             points,
@@ -195,15 +193,31 @@ def _search(
         )
         for k in range(blocks * blocks):
             bx, by = k % blocks * block - reach, k // blocks * block - reach
-            bounds[a * blocks * blocks + k] = _score(
-                grids, top, cells[a], places[a], safe[a], bx, by
-            )
+            bounds[a, k] = _score(grids, top, cells[a], places[a], safe[a], bx, by)
+
+
+@kernel
+def _search(
+    grids: NDArray[np.uint8],
+    cells: Integers,
+    places: Places,
+    safe: Integers,
+    bounds: Points,
+    order: Integers,
+    reach: int,
+    floor: float,
+    barred: Points,
+) -> tuple[float, int, int, int]:
+    """Best score above `floor`, or -1, its angle index and translation; blocks in this order."""
+    top = grids.shape[0] - 1
+    block = 1 << top
+    blocks = (2 * reach + 1 + block - 1) // block
     best, score = floor, -1.0
     angle, dx, dy = 0, 0, 0
-    for k in np.argsort(-bounds, kind="mergesort"):
-        if bounds[k] <= best:
-            break
+    for k in order:
         a, b = k // (blocks * blocks), k % (blocks * blocks)
+        if bounds[a, b] <= best:
+            break
         bx, by = b % blocks * block - reach, b // blocks * block - reach
         found, fx, fy = _descend(
             grids, cells[a], places[a], safe[a], top, bx, by, reach, best, barred[a]
@@ -256,18 +270,14 @@ def search(
         discs[:, :2] = (barred.pose[:2] - centre[:2]) / cell_m
         turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
         discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
-    score, angle, dx, dy = _search(
-        likelihood.grids,
-        points,
-        tangents,
-        angles,
-        centre[0] - likelihood.origin_m[0],
-        centre[1] - likelihood.origin_m[1],
-        math.ceil(window.reach_m / cell_m),
-        cell_m,
-        floor,
-        discs,
-    )
+    reach, block = math.ceil(window.reach_m / cell_m), 1 << (len(likelihood.grids) - 1)
+    cells = np.empty((len(angles), len(points), 3), np.int64)
+    places, safe = np.empty(cells.shape[:2], np.int32), np.empty(len(angles), np.int64)
+    bounds = np.empty((len(angles), math.ceil((2 * reach + 1) / block) ** 2))
+    grids, (x, y) = likelihood.grids, centre[:2] - likelihood.origin_m
+    _bound(grids, points, tangents, angles, x, y, reach, cell_m, cells, places, safe, bounds)
+    order = np.argsort(-bounds, axis=None, kind="stable")  # likely blocks first
+    score, angle, dx, dy = _search(grids, cells, places, safe, bounds, order, reach, floor, discs)
     if score < 0.0:
         return None
     return Peak(np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[angle]]), score)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import kernel
+from bsmap_cli.geometry.compiled import part
 from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
 
-@kernel
+@part
 def keep_unobserved(
     hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
 ) -> int:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import kernel, lean
+from bsmap_cli.geometry.compiled import kernel, lean_part
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
@@ -90,7 +90,7 @@ def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> Non
                     grid[channel, r, c] = max(grid[channel, r, c], np.uint8(up[a] * across[b]))
 
 
-@lean
+@lean_part
 def _larger(one: Row, other: Row, larger: Row) -> None:
     """The larger of each two values, as far as the shorter row goes."""
     for c in range(len(other)):

@@ -7,11 +7,12 @@ curve's normal there.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.compiled import inlined, lean_part
 from bsmap_cli.geometry.kernels import foot_point, polynomial_jet
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import END_TOLERANCE, MIN_COSINE, usable_rows
@@ -57,7 +58,7 @@ def _match(
     return found, row, f, ey * ux - ex * uy, ux, uy
 
 
-@lean
+@lean_part
 def accumulate(  # noqa: PLR0915
     level: LevelArrays,
     matrix: Points,
@@ -88,7 +89,7 @@ def accumulate(  # noqa: PLR0915
     h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
     inliers = squares = lever = total = feigned = 0.0
     f = residual = ux = uy = 0.0
-    neighbour = -1
+    neighbour: Any = np.int64(-1)  # -1 as a literal would be compiled for itself
     for j in range(len(points)):
         qx = cos * points[j, 0] - sin * points[j, 1]
         qy = sin * points[j, 0] + cos * points[j, 1]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.compiled import inlined, lean, lean_part
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.sensor.simulator.grid import Grid, grid_of
 from bsmap_cli.sensor.simulator.world import Shapes
@@ -72,7 +72,7 @@ def _entry(grid: Grid, ray: Ray) -> tuple[float, float]:
     return enter, leave
 
 
-@lean
+@lean_part
 def _first_hit(grid: Grid, ray: Ray, reach: float) -> float:
     """Distance to the first surface up to `reach`, else inf: cell after cell along the ray."""
     x, y, ahead_x, ahead_y = ray
