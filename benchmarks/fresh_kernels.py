@@ -21,7 +21,7 @@ def use_fresh_cache() -> None:
     state = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*.py")):
         text = path.read_bytes()
-        if b"@kernel" in text:
+        if b"geometry.compiled import" in text:
             state.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + text)
     folder = Path(tempfile.gettempdir()) / f"bsmap-kernels-{state.hexdigest()[:12]}"
     os.environ["NUMBA_CACHE_DIR"] = str(folder)

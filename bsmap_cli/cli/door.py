@@ -6,6 +6,7 @@ Exit codes: 0 done; 1 could not; 2 usage or settings; 3 done, but something was 
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import traceback
@@ -20,6 +21,9 @@ from bsmap_cli.errors import BsmapError, ConfigError, UsageError
 
 DONE, COULD_NOT, USAGE, LOSSES, INTERRUPTED = 0, 1, 2, 3, 130
 
+YOUNG_OBJECTS = 50_000
+"""Before a search for cycles among them: numba makes millions, and keeps them."""
+
 # The parser's own usage errors; their class has no public name.
 ParserError: type[Exception] = typer.BadParameter.__mro__[1]
 
@@ -29,6 +33,7 @@ def run(arguments: Sequence[str]) -> int:
     from bsmap_cli.cli.app import build_app
 
     catch_signals()
+    gc.set_threshold(YOUNG_OBJECTS, 50, 50)
     code = guarded(lambda: build_app(arguments)(list(arguments), "bsmap", standalone_mode=False))
     flushed = guarded(_flush_output)
     return code or flushed
