@@ -1,14 +1,19 @@
-"""What differs between two maps of one place: which stretches of curves only one of them has."""
+"""What differs between two maps of one place: which stretches of curves only one of them has.
+
+Of what the later map lacks, its path and its curves tell what it looked through, and what it may
+just not have seen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.evaluation.occupancy import FREE, grid_frame, occupancy
 from bsmap_cli.evaluation.redundancy import near_pairs
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.map_document import LevelSamples, MapDocument
@@ -17,12 +22,17 @@ from bsmap_cli.mapping.sampling import sample_level
 SAMPLES_PER_STEP = 4
 SAME_WAY = 0.5  # cosine: curves that run within 60 degrees show the same face of a wall
 SHORTEST = 3.0  # a shorter stretch tells of noise, not of a change [tolerances]
+CELL_M = 0.05  # of the grid that tells what was looked through
+MOST_CELLS = 2**24  # of it: larger maps get larger cells
 DIGITS = 4  # of coordinates in a report: 0.1 mm
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A part of a curve that the other map does not have; (n, 2) points in the frame of A."""
+    """A part of a curve that the other map does not have; (n, 2) points in the frame of A.
+
+    change : "added", of B; "removed" or "unseen", of A.
+    """
 
     change: str
     length_m: float
@@ -34,14 +44,16 @@ class Stretch:
 class MapDifference:
     """Metres of curves, and where they are.
 
-    added_m : of B, where A has none; removed_m : of A, where B has none; common_m : the rest of
-    A. rms_m : distance of B from A where both have a curve, 0 where they share none.
+    added_m : of B, where A has none; removed_m : of A, where B has none and looked through;
+    unseen_m : of A, where B has none and nothing tells that it looked; common_m : the rest of A.
+    rms_m : distance of B from A where both have a curve, 0 where they share none.
     """
 
     pose_a_b: SE2
     tolerance_m: float
     added_m: float
     removed_m: float
+    unseen_m: float
     common_m: float
     rms_m: float
     segments: tuple[Stretch, ...]
@@ -52,6 +64,7 @@ class MapDifference:
         return {
             "added_m": round(self.added_m, DIGITS),
             "removed_m": round(self.removed_m, DIGITS),
+            "unseen_m": round(self.unseen_m, DIGITS),
             "common_m": round(self.common_m, DIGITS),
             "rms_m": round(self.rms_m, 6),
             "segments": [
@@ -100,20 +113,25 @@ def map_difference(
         theirs.piece,
         theirs.curve_id,
     )
-    removed_rows = ~np.isfinite(_aside(ours, theirs, tolerance))
+    lacking = ~np.isfinite(_aside(ours, theirs, tolerance))
     aside = _aside(theirs, ours, tolerance)
     met = np.isfinite(aside)
-    removed = _stretches(ours, removed_rows, "removed", SHORTEST * tolerance)
-    added = _stretches(theirs, ~met, "added", SHORTEST * tolerance)
-    removed_m = sum((stretch.length_m for stretch in removed), 0.0)
+    shortest_m = SHORTEST * tolerance
+    added = _stretches(theirs, ~met, "added", shortest_m)
+    lost = _stretches(ours, lacking, "unseen", shortest_m)
+    sight = _Sight(b, pose_a_b)
+    told = [part for stretch in lost for part in _told_apart(stretch, sight, shortest_m)]
+    changes = (*added, *told)
+    removed_m, unseen_m = _total(told, "removed"), _total(told, "unseen")
     return MapDifference(
         pose_a_b=pose_a_b,
         tolerance_m=tolerance,
-        added_m=sum((stretch.length_m for stretch in added), 0.0),
+        added_m=_total(added, "added"),
         removed_m=removed_m,
-        common_m=float(_lengths(ours).sum()) - removed_m,
+        unseen_m=unseen_m,
+        common_m=float(_lengths(ours).sum()) - removed_m - unseen_m,
         rms_m=float(np.sqrt(np.mean(aside[met] ** 2))) if met.any() else 0.0,
-        segments=tuple(sorted((*added, *removed), key=lambda stretch: -stretch.length_m)),
+        segments=tuple(sorted(changes, key=lambda stretch: -stretch.length_m)),
     )
 
 
@@ -176,3 +194,49 @@ def _stretches(
             curve_id = int(samples.curve_id[begin])
             found.append(Stretch(change, way_m, curve_id, samples.points[begin:end]))
     return found
+
+
+class _Sight:
+    """What a map looked through: free cells between its path and the surfaces it shows."""
+
+    def __init__(self, document: MapDocument, pose_a_b: SE2) -> None:
+        self._pose_b_a = pose_a_b.inverse()
+        levels, path = document.chosen_levels(), document.path[:, :2].astype(np.float64)
+        rough = [sample_level(level, level.knot_step_m).points for level in levels]
+        cells = grid_frame(np.concatenate(rough), CELL_M).cells
+        cell_m = CELL_M * max(1.0, float(np.sqrt(cells / MOST_CELLS)))
+        self._grid = occupancy(levels, path, resolution_m=cell_m)
+
+    def through(self, points: Points) -> NDArray[np.bool_]:
+        """(n,) bool: which points, in the frame of A, lie in free space."""
+        frame = self._grid.frame
+        places = frame.in_cells(self._pose_b_a.transform(points))
+        column, row = np.floor(places).astype(np.int64).T
+        inside = (column >= 0) & (column < frame.columns) & (row >= 0) & (row < frame.rows)
+        free = np.zeros(len(points), bool)
+        free[inside] = self._grid.cells[row[inside], column[inside]] == FREE
+        return free
+
+
+def _told_apart(stretch: Stretch, sight: _Sight, shortest_m: float) -> Iterator[Stretch]:
+    """The parts of a stretch that are removed and unseen; short ones go with the one before."""
+    through = sight.through(stretch.points)
+    way_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(stretch.points, axis=0).T))))
+    begin, last = 0, len(through) - 1
+    changes = np.flatnonzero(np.diff(through)) + 1
+    ends = [row for row in changes.tolist() if way_m[last] - way_m[row] >= shortest_m]
+    for end in [*ends, last]:
+        if way_m[end] - way_m[begin] < shortest_m and end < last:
+            continue
+        is_through = 2 * int(through[begin : end + 1].sum()) > end + 1 - begin
+        yield replace(
+            stretch,
+            change="removed" if is_through else "unseen",
+            length_m=float(way_m[end] - way_m[begin]),
+            points=stretch.points[begin : end + 1],
+        )
+        begin = end
+
+
+def _total(stretches: Sequence[Stretch], change: str) -> float:
+    return sum((stretch.length_m for stretch in stretches if stretch.change == change), 0.0)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bsmap_cli.evaluation.pose_arrays import transform_poses
 from bsmap_cli.evaluation.redundancy import redundancy
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.map_file import read_map, write_map
@@ -21,7 +22,7 @@ from tests.cli.conftest import SAMPLES
 from tests.cli.tool import bsmap, message, names, shell
 from tests.maps import room_document
 
-KEYS = ["added_m", "removed_m", "common_m", "rms_m", "segments", "at", "tolerance_m"]
+KEYS = ["added_m", "removed_m", "unseen_m", "common_m", "rms_m", "segments", "at", "tolerance_m"]
 POSE = SE2(7.0, -3.0, 2.0)
 
 
@@ -37,7 +38,8 @@ def load(path):
 
 def moved(document, pose):
     levels = tuple(level.moved(pose) for level in document.levels)
-    return replace(document, levels=levels)
+    path = transform_poses(pose, document.path.astype(float)).astype(np.float32)
+    return replace(document, levels=levels, path=path)
 
 
 def mapped(sim, first=0, end=None, ladder=(0.4, 0.2, 0.1)):
@@ -46,7 +48,8 @@ def mapped(sim, first=0, end=None, ladder=(0.4, 0.2, 0.1)):
     for scan, pose in list(zip(sim.scans(), sim.truth.poses, strict=True))[first:end]:
         mapper.insert(scan, SE2.from_array(pose))
     document = mapper.document()
-    return replace(document, levels=document.levels[-1:])
+    path = sim.truth.poses[first:end][::5].astype(np.float32)
+    return replace(document, levels=document.levels[-1:], path=path)
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +121,18 @@ def test_a_person_reads_what_changed(maps):
     ran = bsmap("diff", "before.bsm", "after.bsm", cwd=maps)
     assert ran.returncode == 0
     lines = ran.stdout.decode().splitlines()
-    assert [line.split()[0] for line in lines[:5]] == ["B", "common", "added", "removed", "change"]
+    heads = ["B", "common", "added", "removed", "unseen", "change"]
+    assert [line.split()[0] for line in lines[:6]] == heads
     assert "B lies in A at" in message(ran)
+
+
+def test_a_map_without_a_path_is_said_to_tell_nothing(maps, tmp_path):
+    save(tmp_path / "bare.bsm", replace(load(maps / "after.bsm"), path=np.zeros((0, 3), "f4")))
+    ran = bsmap("diff", "before.bsm", tmp_path / "bare.bsm", "--json", cwd=maps)
+    assert b"B has no path" in ran.stderr
+    report = json.loads(ran.stdout)
+    assert report["removed_m"] == 0.0
+    assert report["unseen_m"] > 1.0
 
 
 def test_two_halves_of_a_ring_make_the_whole(maps, ring):

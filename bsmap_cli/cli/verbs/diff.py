@@ -37,9 +37,11 @@ def run(
 
     B is placed in the frame of A: searched for in the whole of it and refined, or with --at
     looked for near a pose given by hand. Added is a stretch of B with no curve of A within the
-    tolerance that runs the same way; removed is a stretch of A with no such curve of B. That
-    holds for what B never saw, too: it is not in B. The rest of A is common, and RMS is how far
-    B runs from it. Stretches shorter than three tolerances are noise and count as common.
+    tolerance that runs the same way. A stretch of A with no such curve of B is removed where B
+    saw what is behind it, and else unseen: hidden, out of its way, or at the rim of what it
+    shows. B's path and curves tell; a map without a path tells nothing. The rest of A is common,
+    and RMS is how far B runs from it. Stretches shorter than three tolerances are noise and count
+    as common.
 
     All coordinates are in the frame of A. Where nothing is found in common, or more than one
     place fits, the exit code is 1.
@@ -54,6 +56,8 @@ def run(
     voice = talk.talk()
     first, second = read_two(a, b)
     placement = placed(first, second, at, settings.settings(), voice)
+    if not len(second.path):
+        voice.note("B has no path: what was removed cannot be told from what B did not see")
     difference = compare_maps(first, second, placement, tolerance_m=tolerance)
     if json:
         print_json(difference.as_json())
@@ -74,6 +78,7 @@ def _rows(difference: MapDifference) -> list[tuple[str, str]]:
         ("common", f"{difference.common_m:.1f} m of wall, RMS {1e3 * difference.rms_m:.1f} mm"),
         ("added", f"{difference.added_m:.1f} m"),
         ("removed", f"{difference.removed_m:.1f} m"),
+        ("unseen", f"{difference.unseen_m:.1f} m of A, where B did not look"),
     ]
 
 
