@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Iterable
 from typing import Any
+from unicodedata import combining, east_asian_width
 
 from bsmap_cli.cli.talk import BOLD, Talk, harmless
 from bsmap_cli.errors import UsageError
@@ -20,20 +21,38 @@ def print_json(document: Any) -> None:
 
 def print_rows(rows: Iterable[tuple[str, str]], talk: Talk) -> None:
     """`name   value` lines, the values in one column."""
-    rows = [(harmless(name), harmless(value)) for name, value in rows]
-    width = max((len(name) for name, _ in rows), default=0)
+    rows = [(_cell(name), _cell(value)) for name, value in rows]
+    width = max((_width(name) for name, _ in rows), default=0)
     for name, value in rows:
-        print_text(f"{talk.paint(name.ljust(width), BOLD, sys.stdout)}  {value}".rstrip() + "\n")
+        shown = talk.paint(_filled(name, width), BOLD, sys.stdout)
+        print_text(f"{shown}  {value}".rstrip() + "\n")
 
 
 def print_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]], talk: Talk) -> None:
     """A table with a header; columns as wide as their widest cell."""
-    lines = [header, *(tuple(map(harmless, row)) for row in rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
+    lines = [header, *(tuple(map(_cell, row)) for row in rows)]
+    widths = [max(_width(line[column]) for line in lines) for column in range(len(header))]
     for number, line in enumerate(lines):
-        text = "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        text = "  ".join(map(_filled, line, widths))
         text = text.rstrip()
         print_text((talk.paint(text, BOLD, sys.stdout) if number == 0 else text) + "\n")
+
+
+def _cell(text: str) -> str:
+    """Text of one line that steers no terminal."""
+    return harmless(text).replace("\n", "\\n").replace("\t", "\\t")
+
+
+def _width(text: str) -> int:
+    """Columns that a terminal needs: two for a wide letter, none for a mark over another."""
+    if text.isascii():
+        return len(text)
+    wide = sum(east_asian_width(letter) in "WF" for letter in text)
+    return len(text) + wide - sum(combining(letter) > 0 for letter in text)
+
+
+def _filled(text: str, width: int) -> str:
+    return text + " " * (width - _width(text))
 
 
 def print_text(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import replace
 
@@ -68,7 +69,7 @@ def test_bad_scans_are_exit_3_with_their_number(kind, tmp_path):
     MAKERS[kind](tmp_path / "log", [*LOG[:7], bad, *LOG[8:]])
     ran = bsmap("scans", "log", "-o", "out.csv", cwd=tmp_path)
     assert ran.returncode == 3
-    assert "1 scans could not be read" in ran.stderr.decode()
+    assert "1 scan could not be read" in ran.stderr.decode()
     assert scans_in(tmp_path / "out.csv") == [s.stamp_ns for s in LOG if s is not LOG[7]]
 
 
@@ -135,6 +136,26 @@ def test_a_disk_that_fails_to_read():
     ran = bsmap("info", "/proc/self/mem")
     assert ran.returncode == 1
     assert message(ran) == "error: mem: reading fails (Input/output error)"
+
+
+def test_names_of_any_letters_keep_the_table_straight(tmp_path):
+    ros = Ros()
+    names_ = ("/a\nb\tc", "/レーザー", "/скан", "/e\u0301cho")
+    messages = [(name, SCAN, LOG[0].stamp_ns, ros.scan(LOG[0])) for name in names_]
+    (tmp_path / "log").write_bytes(ros_mcap(messages, ros))
+    lines = bsmap("info", "log", cwd=tmp_path).stdout.decode().splitlines()
+    rows = [line.partition("sensor_msgs")[0] for line in lines if "sensor_msgs" in line]
+    assert sorted(row.strip() for row in rows) == sorted([r"/a\nb\tc", *names_[1:]])
+    extra = {names_[1]: 4, names_[3]: -1}  # columns beyond one a letter
+    assert len({len(row) + extra.get(row.strip(), 0) for row in rows}) == 1
+
+
+def test_a_log_that_is_cut_off_is_exit_3_for_info_too(whole, tmp_path):
+    (tmp_path / "log").write_bytes(whole["bag"][: len(whole["bag"]) // 2])
+    ran = bsmap("info", "log", "--json", cwd=tmp_path)
+    assert ran.returncode == 3
+    assert json.loads(ran.stdout)["selected"] == ["/scan"]
+    assert b"missing or damaged" in ran.stderr
 
 
 def test_names_out_of_a_file_do_not_steer_the_terminal(tmp_path):

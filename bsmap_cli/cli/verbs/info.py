@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from bsmap_cli.cli.inputs import log_sources
+from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import Json, Logs, ReadFlags, TalkFlags
 from bsmap_cli.cli.report import print_json, print_rows, print_table
 
 
-def run(*, talk: TalkFlags, read: ReadFlags, logs: Logs = None, json: Json = False) -> None:
+def run(*, talk: TalkFlags, read: ReadFlags, logs: Logs = None, json: Json = False) -> int:
     """Show topics, rates and frames of a log, and what `slam` takes.
 
     \b
@@ -20,13 +21,12 @@ def run(*, talk: TalkFlags, read: ReadFlags, logs: Logs = None, json: Json = Fal
 
     with open_log(log_sources(logs), read.options()) as reader:
         info = reader.info()
-        warnings = reader.report.warnings
     voice = talk.talk()
-    for warning in warnings:
-        voice.warn(warning)
+    tell_warnings(reader.report, voice)
+    code = exit_code(reading_losses(reader.report), strict=False, talk=voice)
     if json:
         print_json(asdict(info))
-        return
+        return code
     print_rows(
         [
             ("format", info.format),
@@ -50,3 +50,4 @@ def run(*, talk: TalkFlags, read: ReadFlags, logs: Logs = None, json: Json = Fal
         for topic in info.topics
     ]
     print_table(header, rows, voice)
+    return code
