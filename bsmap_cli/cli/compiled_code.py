@@ -33,11 +33,11 @@ def keep_compiled_code(talk: Talk, environment: MutableMapping[str, str] = os.en
 
 
 def compiled_note(seconds: float, environment: Mapping[str, str] = os.environ) -> str:
-    """What to say of the time that compiling took."""
+    """What to say of the time that compiling took up to the first scan."""
     later = "later runs start at once"
     if _is_for_once(environment):
         later = f"set {CACHE_VARIABLE} to keep that"
-    return f"compiled for this machine in {seconds:.0f} s; {later}"
+    return f"compiling for this machine took {seconds:.0f} s so far, the rest as needed; {later}"
 
 
 def check_kept(environment: Mapping[str, str] = os.environ) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel
+from bsmap_cli.geometry.compiled import inlined, kernel, part
 
 Integers = NDArray[np.int64]
 
@@ -65,6 +65,28 @@ def _link(head: Integers, after: Integers, before: Integers, degree: int, node: 
     head[degree] = node
 
 
+@part
+def _sort_columns(place: Integers, starts: Integers, rows: Integers) -> None:
+    """Turn the nodes of each column into their places, ascending: by rows, then by columns."""
+    count, entries = len(place), starts[-1]
+    row_starts, columns = np.zeros(count + 1, np.int64), np.empty(entries, np.int64)
+    for k in range(entries):
+        row_starts[place[rows[k]] + 1] += 1
+    for row in range(count):
+        row_starts[row + 1] += row_starts[row]
+    free = row_starts.copy()
+    for column in range(count):
+        for k in range(starts[column], starts[column + 1]):
+            row = place[rows[k]]
+            columns[free[row]] = column
+            free[row] += 1
+    free = starts.copy()
+    for row in range(count):
+        for k in range(row_starts[row], row_starts[row + 1]):
+            rows[free[columns[k]]] = row
+            free[columns[k]] += 1
+
+
 @kernel
 def eliminate(  # noqa: PLR0912, PLR0915
     starts: Integers, nodes: Integers
@@ -82,7 +104,9 @@ def eliminate(  # noqa: PLR0912, PLR0915
     """
     count = len(starts) - 1
     variables, elements = nodes.copy(), np.empty_like(nodes)
-    variable_counts, element_counts = starts[1:] - starts[:-1], np.zeros(count, np.int64)
+    variable_counts, element_counts = np.empty(count, np.int64), np.zeros(count, np.int64)
+    for i in range(count):
+        variable_counts[i] = starts[i + 1] - starts[i]
     degree = variable_counts.copy()
     head, after, before = np.full(count + 1, -1), np.full(count, -1), np.full(count, -1)
     for i in range(count - 1, -1, -1):
@@ -99,7 +123,8 @@ def eliminate(  # noqa: PLR0912, PLR0915
         begin = end = left_starts[step]
         if begin + degree[p] > len(left):
             longer = np.empty(2 * len(left) + degree[p], np.int64)
-            longer[:begin] = left[:begin]
+            for m in range(begin):
+                longer[m] = left[m]
             left = longer
         met[p] = step
         for k in range(starts[p], starts[p] + variable_counts[p]):
@@ -146,9 +171,5 @@ def eliminate(  # noqa: PLR0912, PLR0915
             degree[i] = min(bound, beyond + variable_counts[i] + end - begin - 1)
             _link(head, after, before, degree[i], i)
             least = min(least, degree[i])
-    for step in range(count):
-        column = left[left_starts[step] : left_starts[step + 1]]
-        for k in range(len(column)):
-            column[k] = place[column[k]]
-        column.sort()
+    _sort_columns(place, left_starts, left)
     return place, left_starts, left[: left_starts[count]].copy()

@@ -109,7 +109,8 @@ def _pyramid(grids: Grid) -> None:
                 _larger(grids[h - 1, k, r], grids[h - 1, k, min(r + half, rows - 1)], taller)
                 right = taller[min(half, columns) :]  # beyond the edge there is nothing
                 _larger(taller, right, grids[h, k, r])
-                grids[h, k, r, len(right) :] = taller[len(right) :]
+                for c in range(len(right), columns):
+                    grids[h, k, r, c] = taller[c]
 
 
 def build_likelihood(curve_map: CurveMap, *, cell_m: float, heights: int) -> Likelihood:

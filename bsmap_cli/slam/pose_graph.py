@@ -133,9 +133,15 @@ def _find_spots(
         spots[e] = -1
         if first[e] > 0 and second[e] > 0 and first[e] != second[e]:
             a, b = place[first[e] - 1], place[second[e] - 1]
-            column = min(a, b)
-            part = rows[starts[column] : starts[column + 1]]
-            spots[e] = starts[column] + np.searchsorted(part, max(a, b))
+            column, row = min(a, b), max(a, b)
+            low, high = starts[column], starts[column + 1]
+            while low < high:  # rows ascend
+                middle = (low + high) // 2
+                if rows[middle] < row:
+                    low = middle + 1
+                else:
+                    high = middle
+            spots[e] = low
 
 
 class _NormalEquations:
