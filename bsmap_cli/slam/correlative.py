@@ -37,7 +37,7 @@ def _channel(tx: float, ty: float) -> int:
 
 
 @lean_part
-def _project(
+def project(
     points: Points,
     tangents: Points,
     angle: float,
@@ -100,7 +100,7 @@ def _score(
 
 
 @part
-def _descend(
+def descend(
     grids: NDArray[np.uint8],
     cells: Integers,
     places: Places,
@@ -178,7 +178,7 @@ def _bound(
     block = 1 << top
     blocks = (2 * reach + 1 + block - 1) // block
     for a in range(len(angles)):
-        safe[a] = _project(
+        safe[a] = project(
             points,
             tangents,
             angles[a],
@@ -219,7 +219,7 @@ def _search(
         if bounds[a, b] <= best:
             break
         bx, by = b % blocks * block - reach, b // blocks * block - reach
-        found, fx, fy = _descend(
+        found, fx, fy = descend(
             grids, cells[a], places[a], safe[a], top, bx, by, reach, best, barred[a]
         )
         if found > best:
@@ -235,6 +235,32 @@ class Window:
     centre: Vector
     reach_m: float
     reach_rad: float
+
+
+def window_grid(
+    cell_m: float,
+    points: Points,
+    window: Window,
+    barred: Peak | None,
+    apart_m: float,
+    apart_rad: float,
+) -> tuple[Vector, Points, int]:
+    """The poses of a window: angles, what is barred at each (x, y, radius), reach; in cells.
+
+    The farthest point moves by a cell from one angle to the next.
+    """
+    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
+    turn = cell_m / max(radius, 4.0 * cell_m)
+    steps = math.ceil(min(window.reach_rad, math.pi) / turn)
+    offsets = np.arange(-steps, steps + 1)
+    # what lies near the guess is tried first: a good score spares much of the rest
+    angles = window.centre[2] + offsets[np.argsort(np.abs(offsets), kind="stable")] * turn
+    discs = np.zeros((len(angles), 3))
+    if barred is not None:
+        discs[:, :2] = (barred.pose[:2] - window.centre[:2]) / cell_m
+        turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
+        discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
+    return angles, discs, math.ceil(window.reach_m / cell_m)
 
 
 def search(
@@ -259,18 +285,8 @@ def search(
     if len(points) == 0:
         return None
     cell_m, centre = likelihood.cell_m, window.centre
-    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
-    turn = cell_m / max(radius, 4.0 * cell_m)
-    steps = math.ceil(min(window.reach_rad, math.pi) / turn)
-    offsets = np.arange(-steps, steps + 1)
-    # what lies near the guess is tried first: a good score spares much of the rest
-    angles = centre[2] + offsets[np.argsort(np.abs(offsets), kind="stable")] * turn
-    discs = np.zeros((len(angles), 3))
-    if barred is not None:
-        discs[:, :2] = (barred.pose[:2] - centre[:2]) / cell_m
-        turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
-        discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
-    reach, block = math.ceil(window.reach_m / cell_m), 1 << (len(likelihood.grids) - 1)
+    angles, discs, reach = window_grid(cell_m, points, window, barred, apart_m, apart_rad)
+    block = 1 << (len(likelihood.grids) - 1)
     cells = np.empty((len(angles), len(points), 3), np.int64)
     places, safe = np.empty(cells.shape[:2], np.int32), np.empty(len(angles), np.int64)
     bounds = np.empty((len(angles), math.ceil((2 * reach + 1) / block) ** 2))

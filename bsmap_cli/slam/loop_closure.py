@@ -12,7 +12,7 @@ from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
-from bsmap_cli.slam.correlative import Window, search
+from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.local_slam import LocalSlam
@@ -22,6 +22,7 @@ from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 from bsmap_cli.slam.viewpoints import Viewpoints, median_range
+from bsmap_cli.slam.wide_search import search
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search

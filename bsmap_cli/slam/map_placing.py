@@ -21,13 +21,14 @@ from bsmap_cli.mapping.resampling import one_level
 from bsmap_cli.mapping.sampling import sample_level
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.slam.correlative import Window, search
+from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap, settings_for_map
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.uncertainty import isotropic_information
+from bsmap_cli.slam.wide_search import search
 
 SAMPLES_PER_STEP = 2
 RADII_STEPS = (300.0, 150.0, 60.0)  # of the parts that are searched for [finest knot steps]

@@ -11,7 +11,7 @@ from bsmap_cli.errors import TrackingError
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.visibility import HIT, MISS, look_at
-from bsmap_cli.slam.correlative import Peak, Window, search
+from bsmap_cli.slam.correlative import Peak, Window
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import sample_surfaces
@@ -21,6 +21,7 @@ from bsmap_cli.slam.matching import FEWEST_POINTS
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.uncertainty import isotropic_information
+from bsmap_cli.slam.wide_search import search
 
 LENGTHS, APART = (40, 10), 20  # keyframes of a stretch, and from the start of one to the next
 SEARCHED = 24  # stretches, spread over the log, that are searched for first

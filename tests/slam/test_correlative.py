@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bsmap_cli.slam import wide_search
 from bsmap_cli.slam.correlative import Window, search
 from bsmap_cli.slam.likelihood import CHANNELS, Likelihood, _pyramid, build_likelihood
 from tests.mapping.walls import new_map
@@ -182,3 +183,27 @@ def test_a_floor_that_nothing_reaches_and_a_scan_of_nothing():
     window = Window(CENTRE.as_array(), 0.3, 0.1)
     assert search(likelihood, clusters.points, clusters.tangents, window, floor=0.9999) is None
     assert search(likelihood, np.zeros((0, 2)), np.zeros((0, 2)), window, floor=0.0) is None
+
+
+@given(seeds, st.integers(4, 6), st.sampled_from([0.3, 1.0, 3.0]), st.sampled_from([0.0, 0.2]))
+@settings(max_examples=40, deadline=None)
+def test_blocks_of_angles_leave_no_better_pose_out(seed, heights, far_m, floor):
+    """A wide search finds as good a pose as asking every angle, and as good a rival."""
+    random = np.random.default_rng(seed)
+    likelihood = random_likelihood(random, heights)
+    points = random.uniform(-far_m, far_m, (int(random.integers(1, 12)), 2))
+    angle = random.uniform(-np.pi, np.pi, len(points))
+    tangents = np.column_stack((np.cos(angle), np.sin(angle)))
+    middle = likelihood.origin_m + 0.05 * np.array(likelihood.grids.shape[:1:-1])
+    centre = np.array([*middle, random.uniform(-4.0, 4.0)])
+    window = Window(centre, random.uniform(0.0, 3.0), random.uniform(0.0, 4.0))
+    asked = (likelihood, points, tangents, window)
+    one = search(*asked, floor=floor)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wide_search, "FEW_BLOCKS", 0)
+        two = wide_search.search(*asked, floor=floor)
+        assert (two and two.score) == pytest.approx(one and one.score)
+        if one is not None:
+            two = wide_search.search(*asked, floor=floor, barred=one, apart_m=0.3)
+            one = search(*asked, floor=floor, barred=one, apart_m=0.3)
+            assert (two and two.score) == pytest.approx(one and one.score)
