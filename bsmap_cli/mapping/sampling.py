@@ -66,16 +66,15 @@ def evaluate(
         powers.append(powers[-1] * f)
     row = level.offsets()[curve] + span
     # x + iy, so that one gather serves both coordinates
-    control = level.control_points.astype(np.float64).view(np.complex128)[:, 0]
-    weights = level.weights.astype(np.float64)
+    control = np.ascontiguousarray(level.control_points).view(np.complex64)[:, 0]
     points, weight = np.zeros(len(f), np.complex128), np.zeros(len(f))
     for a, coefficients in enumerate(basis_matrix(degree)):
         basis = np.zeros_like(f)
         for p in range(derivative, degree + 1):
             falling = math.perm(p, derivative)
             basis += falling * coefficients[p] * powers[p - derivative]
-        points += basis * control[row + a]
-        weight += weights[row + a]
+        points += basis * control[row + a].astype(np.complex128)
+        weight += level.weights[row + a]
     return points.view(np.float64).reshape(-1, 2), weight / (degree + 1)
 
 
