@@ -78,7 +78,9 @@ def questions(document: MapDocument, angles: bool) -> str:
     return "".join(",".join(f"{value:.6f}" for value in row) + "\n" for row in rows)
 
 
-def commands(made: Path, folder: Path, document: MapDocument) -> Iterator[tuple[str, list[str], str]]:
+def commands(
+    made: Path, folder: Path, document: MapDocument
+) -> Iterator[tuple[str, list[str], str]]:
     """Name, arguments and standard input of everything that is asked of a map."""
     for name in ("stats", "stats --json"):
         yield name, ["stats", str(made), *name.split()[1:]], ""
@@ -146,14 +148,15 @@ def main() -> None:
         for title, command, asked in commands(made, folder, document):
             if wanted and not any(part in title for part in wanted):
                 continue
-            figures = measured([*command, *(["-f"] if "-o" in command else [])], asked, arguments.limit)
             out = Path(command[command.index("-o") + 1]) if "-o" in command else None
+            figures = measured([*command, *(["-f"] if out else [])], asked, arguments.limit)
             size_mb = out.stat().st_size / 1e6 if out and out.exists() else 0.0
             found[title] = {**figures, "megabytes_out": size_mb}
             numbers = (figures["seconds"], figures["processor_seconds"])
             print(f"{title:<22}" + "".join(f"{value:>9.1f}" for value in numbers), end="")
             print(f"{figures['peak_memory_mb']:>9.0f}{size_mb:>9.1f}", end="")
-            print("" if not figures["status"] else f"  {figures['status']} {figures['said']}", flush=True)
+            failed = f"  exit {figures['status']} {figures['said']}" if figures["status"] else ""
+            print(failed, flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=1) + "\n")
 

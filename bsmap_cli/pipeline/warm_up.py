@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bsmap_cli.config import load_settings
 from bsmap_cli.geometry.compiled import PARTS
 from bsmap_cli.logs.reader import LogInfo, LogReader, ReadReport
 from bsmap_cli.mapping.map_document import MapDocument
+from bsmap_cli.mapping.queries import MapQuery
 from bsmap_cli.pipeline.localize import run_localize
 from bsmap_cli.pipeline.runs import run_map, run_slam
 from bsmap_cli.pipeline.two_maps import merge_maps, place_map
@@ -71,7 +74,13 @@ def _rehearsals() -> Iterator[Callable[[], object]]:
     known: MapDocument = run_map(_Rehearsed(made), made.truth, default).document
     yield lambda: run_localize(_Rehearsed(made), known, default)
     yield lambda: run_slam(_Rehearsed(made), default, old=known)
+    yield lambda: _asked(MapQuery(known.finest))
     yield lambda: merge_maps(known, known, place_map(known, known, default), default)
+
+
+def _asked(query: MapQuery) -> None:
+    query.nearest(np.zeros((1, 2)))
+    query.rays(np.zeros((1, 2)), np.zeros(1))
 
 
 class _Rehearsed:
