@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import kernel, lean
+from bsmap_cli.geometry.compiled import kernel, lean, lean_part
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.slam import correlative
-from bsmap_cli.slam.correlative import Integers, Peak, Window, descend, project
+from bsmap_cli.slam.correlative import Integers, Peak, Places, Window, descend, project
 from bsmap_cli.slam.likelihood import CHANNELS, Grid, Likelihood
 
 FINEST = 3  # height of the finest blocks that span angles
@@ -43,8 +43,8 @@ def search(
         likelihood.cell_m, points, window, barred, apart_m, apart_rad
     )
     block = 1 << (heights - 1)
-    blocks = len(angles) * ((2 * reach + block) // block) ** 2
-    if heights <= FINEST or blocks <= FEW_BLOCKS:
+    asked = len(angles) * ((2 * reach + block) // block) ** 2
+    if heights <= FINEST or asked <= FEW_BLOCKS:
         return correlative.search(
             likelihood,
             points,
@@ -61,16 +61,35 @@ def search(
     cell_m, centre, origin = likelihood.cell_m, window.centre, likelihood.origin_m
     # neighbours are met or missed together: far from one another, few points tell of all
     spread = np.argsort(np.arange(len(points)) * SPREAD % 1.0, kind="stable")
+    points, tangents = points[spread], tangents[spread]
     table, bounds = _coarse_levels(likelihood.grids[FINEST], top)
+    turn = angles[1] - angles[0] if len(angles) > 1 else 0.0
+    frame = np.array([centre[0] - origin[0], centre[1] - origin[1], cell_m, turn])
+    firsts = np.cumsum([0, *(((len(angles) - 1) >> h) + 1 for h in range(FINEST, top + 1))])
+    blocks = np.empty((firsts[-1], len(points), 4), np.int64)
+    cells = np.empty((len(angles), len(points), 3), np.int64)
+    places, safe = np.empty(cells.shape[:2], np.int32), np.empty(len(angles), np.int64)
+    side, turns = ((2 * reach) >> top) + 1, ((len(angles) - 1) >> top) + 1
+    at, row, column = (index.ravel() for index in np.indices((turns, side, side)))
+    nodes = np.stack((at, (column << top) - reach, (row << top) - reach), axis=1)
+    limits = np.empty(len(nodes))
+    grids, size = likelihood.grids, np.array([*likelihood.grids.shape[2:], reach])
+    _project_all(points, tangents, angles, frame, size, firsts, blocks, cells, places, safe)
+    _bound_all(table, bounds, top, blocks[firsts[-2] :], nodes, limits)
+    order = np.argsort(-limits, kind="stable")
     found, angle, dx, dy = _search(
-        likelihood.grids,
+        grids,
         table,
         bounds,
-        points[spread],
-        tangents[spread],
-        angles,
-        np.array([centre[0] - origin[0], centre[1] - origin[1], cell_m, floor]),
+        firsts,
+        blocks,
+        cells,
+        places,
+        safe,
+        nodes[order],
+        limits[order],
         reach,
+        floor,
         discs,
     )
     if found < 0.0:
@@ -133,7 +152,7 @@ def _next_level(level: Grid, wider: Grid) -> None:
                 wider[k, i, j] = value
 
 
-@lean
+@lean_part
 def _place(
     points: Points, tangents: Points, angle: float, half_rad: float, frame: Vector, cells: Integers
 ) -> None:
@@ -153,7 +172,7 @@ def _place(
             cells[j, 3] = min(math.floor(turn + spread), cells[j, 2] + CHANNELS - 1)
 
 
-@lean
+@lean_part
 def _bound(
     table: Integers, bounds: Grid, height: int, cells: Integers, dx: int, dy: int, best: float
 ) -> float:
@@ -174,7 +193,7 @@ def _bound(
     return total / (255.0 * len(cells))
 
 
-@lean
+@lean_part
 def _score_above(windows: Grid, cells: Integers, dx: int, dy: int, best: float) -> float:
     """`score` at height FINEST, given up where it cannot reach `best`."""
     _, rows, columns = windows.shape
@@ -190,36 +209,30 @@ def _score_above(windows: Grid, cells: Integers, dx: int, dy: int, best: float) 
 
 
 @kernel
-def _search(  # noqa: PLR0912, PLR0915
-    grids: Grid,
-    table: Integers,
-    bounds: Grid,
+def _project_all(
     points: Points,
     tangents: Points,
     angles: Vector,
     frame: Vector,
-    reach: int,
-    barred: Points,
-) -> tuple[float, int, int, int]:
-    """Best score above the floor, or -1, its angle index and translation; likely blocks first.
+    size: Integers,
+    firsts: Integers,
+    blocks: Integers,
+    cells: Integers,
+    places: Places,
+    safe: Integers,
+) -> None:
+    """Where the points lie at each angle, and in each block of angles of each height.
 
-    frame : x, y [m] of the window's centre from the corner of the grid; cell [m]; floor.
+    frame : x, y [m] of the window's centre from the corner of the grid; cell [m]; turn from one
+    angle to the next. size : rows and columns of the grid, reach of the window. firsts : the first
+    block of each height.
     """
-    n, count = len(points), len(angles)
-    top = FINEST + len(table) - 1
-    turn = angles[1] - angles[0]
-    firsts = np.zeros(len(table) + 1, np.int64)  # of the angle blocks of each height
-    for h in range(FINEST, top + 1):
-        firsts[h - FINEST + 1] = firsts[h - FINEST] + ((count - 1) >> h) + 1
-    blocks = np.empty((firsts[-1], n, 4), np.int64)
-    for h in range(FINEST, top + 1):
-        half_rad = 0.5 * ((1 << h) - 1) * turn
-        for b in range(firsts[h - FINEST + 1] - firsts[h - FINEST]):
-            middle = angles[b << h] + half_rad
-            _place(points, tangents, middle, half_rad, frame, blocks[firsts[h - FINEST] + b])
-    cells = np.empty((count, n, 3), np.int64)
-    places, safe = np.empty((count, n), np.int32), np.empty(count, np.int64)
-    for a in range(count):
+    for k in range(len(firsts) - 1):
+        half_rad = 0.5 * ((1 << FINEST + k) - 1) * frame[3]
+        for b in range(firsts[k + 1] - firsts[k]):
+            middle = angles[b << FINEST + k] + half_rad
+            _place(points, tangents, middle, half_rad, frame, blocks[firsts[k] + b])
+    for a in range(len(angles)):
         safe[a] = project(
             points,
             tangents,
@@ -227,33 +240,67 @@ def _search(  # noqa: PLR0912, PLR0915
             frame[0],
             frame[1],
             frame[2],
-            grids.shape[2:],
-            -reach,
-            reach + (1 << FINEST),
+            (size[0], size[1]),
+            -size[2],
+            size[2] + (1 << FINEST),
             cells[a],
             places[a],
         )
 
-    side = ((2 * reach) >> top) + 1
-    turns = ((count - 1) >> top) + 1
-    nodes = np.empty((turns * side * side, 3), np.int64)
-    limits = np.empty(len(nodes))
+
+@kernel
+def _bound_all(
+    table: Integers, bounds: Grid, height: int, blocks: Integers, nodes: Integers, limits: Vector
+) -> None:
+    """What each node (block of angles, x, y) of one height cannot score more than."""
     for k in range(len(nodes)):
-        nodes[k, 0] = k // (side * side)
-        nodes[k, 1] = ((k % side) << top) - reach
-        nodes[k, 2] = ((k // side % side) << top) - reach
-        block = blocks[firsts[top - FINEST] + nodes[k, 0]]
-        limits[k] = _bound(table, bounds, top, block, nodes[k, 1], nodes[k, 2], 0.0)
+        block = blocks[nodes[k, 0]]
+        limits[k] = _bound(table, bounds, height, block, nodes[k, 1], nodes[k, 2], 0.0)
+
+
+@lean_part
+def _enter(
+    children: Integers, values: Vector, count: int, value: float, b: int, x: int, y: int
+) -> None:
+    """Put a child among those before it, in ascending order of their values."""
+    place = count
+    while place > 0 and values[place - 1] > value:
+        values[place] = values[place - 1]
+        for i in range(3):
+            children[place, i] = children[place - 1, i]
+        place -= 1
+    values[place] = value
+    children[place, 0], children[place, 1], children[place, 2] = b, x, y
+
+
+@kernel
+def _search(  # noqa: PLR0912
+    grids: Grid,
+    table: Integers,
+    bounds: Grid,
+    firsts: Integers,
+    blocks: Integers,
+    cells: Integers,
+    places: Places,
+    safe: Integers,
+    nodes: Integers,
+    limits: Vector,
+    reach: int,
+    floor: float,
+    barred: Points,
+) -> tuple[float, int, int, int]:
+    """Best score above `floor`, or -1, its angle index and translation; nodes in this order."""
+    top = FINEST + len(table) - 1
     stack = np.empty((8 * (top - FINEST + 2), 4), np.int64)
     stacked = np.empty(len(stack))
     children, values = np.empty((8, 3), np.int64), np.empty(8)
-    best, reached = frame[3], -1.0
+    best, reached = floor, -1.0
     angle, dx, dy = 0, 0, 0
-    for k in np.argsort(-limits, kind="mergesort"):
+    for k in range(len(nodes)):
         if limits[k] <= best:
             break
         stack[0, 0], stacked[0] = top, limits[k]
-        stack[0, 1:] = nodes[k]
+        stack[0, 1], stack[0, 2], stack[0, 3] = nodes[k]
         depth = 1
         while depth > 0:
             depth -= 1
@@ -262,12 +309,12 @@ def _search(  # noqa: PLR0912, PLR0915
             h, b, x, y = stack[depth]
             opened = 0
             if h == FINEST:
-                for a in range(b << h, min((b + 1) << h, count)):
+                for a in range(b << h, min((b + 1) << h, len(cells))):
                     value = _score_above(grids[FINEST], cells[a], x, y, best)
                     if value > best:
-                        children[opened, 0], values[opened] = a, value
+                        _enter(children, values, opened, value, a, x, y)
                         opened += 1
-                for i in np.argsort(-values[:opened], kind="mergesort"):
+                for i in range(opened - 1, -1, -1):
                     if values[i] <= best:
                         break
                     a = children[i, 0]
@@ -280,18 +327,17 @@ def _search(  # noqa: PLR0912, PLR0915
                 continue
             half = 1 << (h - 1)
             for i in range(8):
-                turned = 2 * b + (i >> 2)
+                part = 2 * b + (i >> 2)
                 cx, cy = x + half * (i & 1), y + half * (i >> 1 & 1)
-                if turned << (h - 1) >= count or max(cx, cy) > reach:
+                if part << (h - 1) >= len(cells) or max(cx, cy) > reach:
                     continue
-                block = blocks[firsts[h - 1 - FINEST] + turned]
+                block = blocks[firsts[h - 1 - FINEST] + part]
                 value = _bound(table, bounds, h - 1, block, cx, cy, best)
                 if value > best:
-                    children[opened, 0], children[opened, 1], children[opened, 2] = turned, cx, cy
-                    values[opened] = value
+                    _enter(children, values, opened, value, part, cx, cy)
                     opened += 1
-            for i in np.argsort(values[:opened], kind="mergesort"):  # the best one is opened first
+            for i in range(opened):  # the best one last, so that it is opened first
                 stack[depth, 0], stacked[depth] = h - 1, values[i]
-                stack[depth, 1:] = children[i]
+                stack[depth, 1], stack[depth, 2], stack[depth, 3] = children[i]
                 depth += 1
     return reached, angle, dx, dy
