@@ -1,4 +1,4 @@
-"""Bounds for blocks of poses in a search: heights, each coarser, above the likelihood's own ones."""
+"""Bounds for blocks of poses in a search: heights above those of the likelihood, and coarser."""
 
 from __future__ import annotations
 
