@@ -7,13 +7,24 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
+from bsmap_cli.cli.door import DONE
+from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
 from bsmap_cli.cli.options import option, parse_laser_pose
+from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from bsmap_cli.sensor.scan import Scan
 
 REPLAY = "Replay"
+
+
+@dataclass(slots=True)
+class Replayed:
+    """The scans of a log, and once they were used the exit code that its reading calls for."""
+
+    scans: Iterator[Scan]
+    code: int = DONE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,10 +57,10 @@ class ReplayFlags:
             raise UsageError("--topic and --laser-pose are about the log: give that with --log")
 
     @contextmanager
-    def scans(self) -> Iterator[Iterator[Scan]]:
-        """The scans of the log; none where there is no log."""
+    def scans(self, talk: Talk) -> Iterator[Replayed]:
+        """The scans of the log, none where there is no log; what the reader says is passed on."""
         if self.log is None:
-            yield iter(())
+            yield Replayed(iter(()))
             return
         from bsmap_cli.logs.open_log import open_log
         from bsmap_cli.logs.reader import ReadOptions
@@ -59,4 +70,7 @@ class ReplayFlags:
             topics=tuple(self.topic or ()), pose_base_laser=pose, laser_flipped=flipped
         )
         with open_log([self.log], options) as reader:
-            yield reader.scans()
+            replayed = Replayed(reader.scans())
+            yield replayed
+            tell_warnings(reader.report, talk)
+            replayed.code = exit_code(reading_losses(reader.report), strict=False, talk=talk)

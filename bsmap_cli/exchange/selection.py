@@ -42,6 +42,11 @@ class Selection:
     clip: Box | None = None
 
     @property
+    def is_empty(self) -> bool:
+        """Whether nothing is drawn."""
+        return not any(len(level.pieces.curve) for level in self.levels)
+
+    @property
     def frame(self) -> str:
         """The name of the map's frame."""
         return str(self.document.meta.get("frame", "map"))

@@ -105,6 +105,28 @@ def test_a_clip_leaves_less(here):
     assert counts[1] < counts[0]
 
 
+def test_a_box_beside_the_map_is_said_to_be_empty(here):
+    ran = bsmap("export", "map.bsm", "-o", "x.svg", "--clip", "900,900,901,901", cwd=here)
+    assert ran.returncode == 0
+    assert "nothing is drawn" in message(ran)
+    assert (
+        "nothing is drawn"
+        not in bsmap("export", "map.bsm", "-o", "y.svg", cwd=here).stderr.decode()
+    )
+
+
+@pytest.mark.parametrize("verb", [("view", "x.html"), ("export", "x.mcap")])
+def test_a_replayed_log_that_is_cut_off_is_exit_3(verb, here):
+    data = (here / "run.bag").read_bytes()
+    (here / "cut.bag").write_bytes(data[: len(data) // 2])
+    name, output = verb
+    arguments = (name, "map.bsm", "--traj", "map.tum", "--log", "cut.bag", "-o", output)
+    ran = bsmap(*arguments, cwd=here)
+    assert ran.returncode == 3
+    assert b"missing or damaged" in ran.stderr
+    assert (here / output).stat().st_size > 0
+
+
 @pytest.mark.parametrize("damage", ["cut", "flipped", "text", "empty"])
 def test_a_damaged_map_is_one_line(damage, here):
     data = bytearray((here / "map.bsm").read_bytes())

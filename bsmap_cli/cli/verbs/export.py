@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from bsmap_cli.cli.door import DONE
 from bsmap_cli.cli.formats import MAP_FORMATS, MapFormat, chosen_format
 from bsmap_cli.cli.inputs import map_source, read_map_file, read_trajectory
 from bsmap_cli.cli.options import Force, MapIn, TalkFlags, box, numbers, option
 from bsmap_cli.cli.outputs import STDOUT, Output, Outputs
 from bsmap_cli.cli.replay import ReplayFlags
+from bsmap_cli.cli.talk import Talk
 from bsmap_cli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -82,7 +84,7 @@ def run(
     part: PartFlags,
     replay: ReplayFlags,
     force: Force = False,
-) -> None:
+) -> int:
     """Write a map in the format of another program.
 
     The extension of the output tells the format, or --format.
@@ -106,6 +108,7 @@ def run(
       bsmap export map.bsm -o map.yaml --resolution 0.1
       bsmap export map.bsm -o - --format geojson > map.geojson
     """
+    voice = talk.talk()
     source = map_source(map_)
     kind = chosen_format(output, format_, MAP_FORMATS)
     _check_options(part, replay, kind)
@@ -120,10 +123,17 @@ def run(
             from bsmap_cli.exchange.map_json import write_map_json
 
             write_map_json(target.open(), document)
-        elif image is not None:
-            _write_nav2(target, image, _selection(document, part), part)
         else:
-            _write_selection(target, _selection(document, part), kind, part, replay)
+            selection = _selection(document, part)
+            if selection.is_empty and kind not in ("yaml", "png"):  # which refuse it
+                voice.warn("nothing is drawn: the map, or what --clip leaves of it, is empty")
+            if image is not None:
+                _write_nav2(target, image, selection, part)
+            elif kind == "mcap":
+                return _write_mcap(target, selection, _tolerance_m(part), replay, voice)
+            else:
+                _write_selection(target, selection, kind, part)
+    return DONE
 
 
 def _check_options(part: PartFlags, replay: ReplayFlags, kind: MapFormat) -> None:
@@ -185,12 +195,15 @@ def _write_nav2(target: Output, image: Output, selection: Selection, part: PartF
     write_nav2_yaml(target.open(), grid, Path(image.path).name)
 
 
-def _write_selection(
-    target: Output, selection: Selection, kind: MapFormat, part: PartFlags, replay: ReplayFlags
-) -> None:
+def _tolerance_m(part: PartFlags) -> float:
     from bsmap_cli.exchange.flatten import TOLERANCE_M
 
-    tolerance_m = TOLERANCE_M if part.simplify is None else part.simplify
+    return TOLERANCE_M if part.simplify is None else part.simplify
+
+
+def _write_selection(
+    target: Output, selection: Selection, kind: MapFormat, part: PartFlags
+) -> None:
     stream = target.open()
     if kind == "svg":
         from bsmap_cli.exchange.svg import write_svg
@@ -200,7 +213,7 @@ def _write_selection(
         from bsmap_cli.exchange.geojson import write_geojson
 
         origin = _origin(part.origin)
-        write_geojson(stream, selection, origin=origin, tolerance_m=tolerance_m)
+        write_geojson(stream, selection, origin=origin, tolerance_m=_tolerance_m(part))
     elif kind == "dxf":
         from bsmap_cli.exchange.dxf import write_dxf
 
@@ -213,20 +226,19 @@ def _write_selection(
         from bsmap_cli.exchange.ply import write_ply
 
         write_ply(stream, selection)
-    elif kind == "png":
+    else:
         from bsmap_cli.evaluation.occupancy import trinary_png
         from bsmap_cli.exchange.nav2 import RESOLUTION_M, selected_occupancy
 
         grid = selected_occupancy(selection, resolution_m=part.resolution or RESOLUTION_M)
         stream.write(trinary_png(grid.cells))
-    else:
-        _write_mcap(target, selection, tolerance_m, replay)
 
 
 def _write_mcap(
-    target: Output, selection: Selection, tolerance_m: float, replay: ReplayFlags
-) -> None:
+    target: Output, selection: Selection, tolerance_m: float, replay: ReplayFlags, talk: Talk
+) -> int:
     from bsmap_cli.exchange.viewer_mcap import write_viewer_mcap
 
-    with replay.scans() as scans:
-        write_viewer_mcap(target.open(), selection, scans=scans, tolerance_m=tolerance_m)
+    with replay.scans(talk) as replayed:
+        write_viewer_mcap(target.open(), selection, scans=replayed.scans, tolerance_m=tolerance_m)
+    return replayed.code

@@ -29,7 +29,7 @@ def run(
     ] = None,
     replay: ReplayFlags,
     force: Force = False,
-) -> None:
+) -> int:
     """Write a map as one page for a browser: zoom, measure, play.
 
     The page needs no network. With --log and --traj it shows the scan at each pose.
@@ -50,5 +50,7 @@ def run(
         document, _ = read_map_file(source)
         trajectory = read_trajectory(traj) if traj is not None else None
         selection = select(document, level=level, trajectory=trajectory)
-        with replay.scans() as scans:
-            write_page(target.open(), selection, title=Path(source).stem or "map", scans=scans)
+        title = Path(source).stem or "map"
+        with replay.scans(talk.talk()) as replayed:
+            write_page(target.open(), selection, title=title, scans=replayed.scans)
+    return replayed.code
