@@ -66,7 +66,7 @@ class _Plain(Silent):
             self._started = True
             self._tell_start()
             waited_s = perf_counter() - self._began
-            if waited_s > SLOW_START_S:
+            if waited_s > SLOW_START_S and _has_compiled():
                 self._talk.note(compiled_note(waited_s))
             self._began = perf_counter()
 
@@ -74,6 +74,13 @@ class _Plain(Silent):
         """What took time before the first scan was not the compiler."""
         if not self._started:
             self._began = perf_counter()
+
+
+def _has_compiled() -> bool:
+    """Whether it was the compiler that took the time: a slow pipe or disk takes some, too."""
+    from bsmap_cli.pipeline.warm_up import freshly_compiled
+
+    return freshly_compiled() > 0
 
 
 class _Bar(_Plain):

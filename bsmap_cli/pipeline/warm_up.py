@@ -42,9 +42,13 @@ def warm_up() -> WarmUp:
     for rehearsal in _rehearsals():
         rehearsal()
     kernels = list(compiled_functions())
-    compiled = sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels)
     folders = [kernel.stats.cache_path for kernel in kernels]
-    return WarmUp(len(kernels), compiled, Path(os.path.commonpath(folders)))
+    return WarmUp(len(kernels), freshly_compiled(), Path(os.path.commonpath(folders)))
+
+
+def freshly_compiled() -> int:
+    """How many variants of kernels this process has compiled, and not found on the disk."""
+    return sum(sum(kernel.stats.cache_misses.values()) for kernel in compiled_functions())
 
 
 def compiled_functions() -> Iterator[Any]:

@@ -103,6 +103,12 @@ def test_a_closed_standard_error_changes_nothing(here):
     assert ran.stdout.startswith(b"file")
 
 
+def test_waiting_for_a_slow_pipe_is_not_compiling(here):
+    ran = shell("(sleep 3.5; cat run.mcap) | bsmap slam - -o m.bsm", here)
+    assert ran.returncode == 0
+    assert b"compiled" not in ran.stderr
+
+
 def test_standard_input_that_is_nothing_is_not_taken_for_a_log(tmp_path):
     for verb in (["slam", "-o", "m.bsm"], ["info"], ["stats"]):
         ran = bsmap(*verb, cwd=tmp_path)  # standard input is /dev/null

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import signal
 import subprocess
 import time
@@ -24,12 +25,12 @@ def wait_until_it_listens(process):
         time.sleep(0.01)
 
 
-def interrupted(folder, number, after_s, *arguments, **changes):
+def interrupted(folder, number, after_s, *arguments, stdin=subprocess.DEVNULL, **changes):
     """Send a signal to a running command; its exit code and what it said."""
     process = subprocess.Popen(
         [BSMAP, *map(str, arguments)],
         cwd=folder,
-        stdin=subprocess.DEVNULL,
+        stdin=stdin,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=environment(**changes),
@@ -59,8 +60,15 @@ def test_ctrl_c_is_caught_from_the_start_and_in_the_compiler(after_s, tmp_path):
     cache = tmp_path / "cache"  # empty: everything is compiled anew
     folder = tmp_path / "run"
     folder.mkdir()
-    command = ("slam", SAMPLES / "loop.csv.gz", "-q", "-o", "map.bsm")
-    ended, said = interrupted(folder, signal.SIGINT, after_s, *command, NUMBA_CACHE_DIR=str(cache))
+    command = ("slam", "-", "-q", "-o", "map.bsm")
+    log = f"zcat '{SAMPLES / 'loop.csv.gz'}' && exec sleep 300"  # however fast it is, it waits
+    with subprocess.Popen(
+        ["sh", "-c", log], stdout=subprocess.PIPE, start_new_session=True
+    ) as feed:
+        ended, said = interrupted(
+            folder, signal.SIGINT, after_s, *command, stdin=feed.stdout, NUMBA_CACHE_DIR=str(cache)
+        )
+        os.killpg(feed.pid, signal.SIGKILL)
     assert ended == 130, said
     assert said in ("", "error: interrupted\n")
     assert names(folder) == []

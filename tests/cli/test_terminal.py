@@ -149,3 +149,29 @@ def test_completion_works_in_a_shell_after_it_was_installed(tmp_path):
 def test_the_completion_script_is_that_of_the_shell_in_use(tmp_path):
     ran = shell("bsmap --show-completion; true", tmp_path)
     assert b"complete -o default -F _bsmap_completion bsmap" in ran.stdout
+
+
+def test_points_typed_at_a_terminal_are_answered_one_by_one(here):
+    ours, theirs = pty.openpty()
+    command = [BSMAP, "query", "map.bsm", "distance"]
+    process = subprocess.Popen(
+        command, cwd=here, stdin=theirs, stdout=theirs, stderr=theirs, env=environment()
+    )
+    os.close(theirs)
+
+    def wait_for(pattern):
+        seen = b""
+        while not re.search(pattern, seen):
+            assert select.select([ours], [], [], 60)[0], seen
+            seen += os.read(ours, 65536)
+
+    try:
+        wait_for(rb"x,y a line, then Ctrl-D")
+        for point in (b"1,1", b"2,1"):
+            os.write(ours, point + b"\n")
+            wait_for(rb"\d\.\d{6}\r\n")
+        os.write(ours, b"\x04")
+        assert process.wait(60) == 0
+    finally:
+        process.kill()
+        os.close(ours)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import sys
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,6 +14,7 @@ import typer
 from bsmap_cli.cli.inputs import STDIN, read_map_file, text_input
 from bsmap_cli.cli.options import Json, TalkFlags, option
 from bsmap_cli.cli.report import print_json, print_text
+from bsmap_cli.cli.talk import is_terminal
 from bsmap_cli.errors import BsmapError, LogError, MapFileError, UsageError
 
 if TYPE_CHECKING:
@@ -78,8 +80,14 @@ def run(
         batches = [[_numbers(point.split(","), kind, point) for point in points]]
         _answer(asked, kind, batches, range_max, json)
         return
+    if is_terminal(sys.stdin):  # each line gets its answer at once
+        form = ",".join(COLUMNS[kind])
+        talk.talk().note(f"points are read from the terminal: {form} a line, then Ctrl-D")
+        by_hand = iter(sys.stdin.readline, "")
+        _answer(asked, kind, _batches(by_hand, kind, 1), range_max, json)
+        return
     with text_input(STDIN) as lines:
-        _answer(asked, kind, _batches(lines, kind), range_max, json)
+        _answer(asked, kind, _batches(lines, kind, AT_ONCE), range_max, json)
 
 
 def _answer(
@@ -124,8 +132,8 @@ def _answers(asked: MapQuery, kind: str, batch: list[Row], range_max_m: float) -
         )
 
 
-def _batches(lines: Iterator[str], kind: str) -> Iterator[list[Row]]:
-    """Rows of CSV, some at a time; a header tells the order of the columns."""
+def _batches(lines: Iterator[str], kind: str, at_once: int) -> Iterator[list[Row]]:
+    """Rows of CSV, so many at a time; a header tells the order of the columns."""
     wanted = COLUMNS[kind]
     reader = csv.reader(line for line in lines if line.strip() and not line.startswith("#"))
     first = next(reader, None)
@@ -142,7 +150,7 @@ def _batches(lines: Iterator[str], kind: str) -> Iterator[list[Row]]:
     rows = iter(rest)
     while batch := [
         _numbers([cells[k] for k in order if k < len(cells)], kind, ",".join(cells), LogError)
-        for cells in islice(rows, AT_ONCE)
+        for cells in islice(rows, at_once)
     ]:
         yield batch
 
