@@ -1,8 +1,8 @@
 """Tidy a level once it stands: absorb what is drawn twice, join ends that meet.
 
-A wall seen first in pieces leaves curves that overlap or follow one another. The lighter of two
-that run together gives way where the heavier covers it; where one then begins at the other's end,
-it is sampled and fitted on the other's lattice: their offsets differ by no whole knots.
+A wall seen first in pieces leaves curves that overlap or follow one another. The lighter gives
+way where the heavier covers it; where one then begins at the other's end, it is sampled and fitted
+on the other's lattice: their offsets differ by no whole knots.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from bsmap_cli.mapping.span_index import EMPTY, cell_key, find_slot, remove_span
 SAMPLES = 4  # a knot step
 COVER_STEPS, COVER_COSINE = 0.5, 0.866  # runs together: within half a knot step and 30 degrees
 ABSORBED = 0.8  # covered share at which a curve goes altogether
-# gap along and aside [knot steps], 20 degrees
-JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = 1.0, 0.25, 0.94
+JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = 1.0, 0.25, 0.94  # gap along, aside [knot steps]; 20 degrees
 JOIN_SAMPLES, JOIN_TAIL, JOIN_PENALTY = 8, 8.0, 1e-6  # a knot step; knot steps before the seam
 
 
@@ -282,14 +281,8 @@ def tidy(curve_map: CurveMap, *, min_length: float) -> None:
         heaviness = np.empty(len(curve_map))
         _weigh_curves(curve_map.arrays, heaviness)
         order = np.argsort(heaviness, kind="stable")
-        _absorb(
-            curve_map.arrays,
-            curve_map.matrix,
-            curve_map.knot_step_m,
-            heaviness,
-            order,
-            min_length,
-        )
+        arrays, matrix, step_m = curve_map.arrays, curve_map.matrix, curve_map.knot_step_m
+        _absorb(arrays, matrix, step_m, heaviness, order, min_length)
         if not _join_ends(curve_map):
             break
 
