@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +14,14 @@ from bsmap_cli.errors import UsageError
 from bsmap_cli.evaluation.visibility import visible_cells
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
-from bsmap_cli.mapping.sampling import sample_level
+from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, sample_pieces
 
 Cells = NDArray[np.uint8]
 
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 MARGIN_M = 0.5
 MOST_CELLS = 2**27
+SAMPLES_AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +77,10 @@ def occupancy(
     path : (m, 2) positions [m], map frame; a free cell lies between one of them and the free side
     of a curve within `range_max_m`. UsageError where the grid would not fit into memory.
     """
-    sampled = [sample_level(level, resolution_m / 3) for level in levels]
-    points = np.concatenate([np.zeros((0, 2)), *(samples.points for samples in sampled)])
-    frame = grid_frame(points, resolution_m)
+    corners = [np.zeros((0, 2))]
+    for samples in _sampled(levels, resolution_m):
+        corners += [samples.points.min(axis=0)[None], samples.points.max(axis=0)[None]]
+    frame = grid_frame(np.concatenate(corners), resolution_m)
     if frame.cells > MOST_CELLS:
         raise UsageError(
             f"a grid of {frame.columns} x {frame.rows} cells is too large:"
@@ -86,13 +88,27 @@ def occupancy(
         )
     cells = np.full((frame.rows, frame.columns), UNKNOWN, np.uint8)
     facing = np.zeros((frame.rows, frame.columns), np.uint8)
-    for samples in sampled:
+    for samples in _sampled(levels, resolution_m):
         _mark(facing, frame, samples)
     if len(path) and frame.cells:
         views = frame.in_cells(path)
         cells[visible_cells(facing, views, range_max_m / resolution_m)] = FREE
     cells[facing != 0] = OCCUPIED
     return Occupancy(frame, cells)
+
+
+def _sampled(levels: Sequence[MapLevel], resolution_m: float) -> Iterator[LevelSamples]:
+    """Samples so close that no cell is missed, of some pieces at a time to spare memory."""
+    for level in levels:
+        pieces = drawn_pieces(level)
+        per_step = 3.0 * level.knot_step_m / resolution_m
+        ends = np.cumsum((pieces.end - pieces.start) * per_step)
+        total = float(ends[-1]) if len(ends) else 0.0
+        cuts = np.searchsorted(ends, np.arange(SAMPLES_AT_ONCE, total, SAMPLES_AT_ONCE)) + 1
+        for rows in np.split(np.arange(len(ends)), cuts):
+            if len(rows):
+                some = DrawnPieces(pieces.curve[rows], pieces.start[rows], pieces.end[rows])
+                yield sample_pieces(level, some, resolution_m / 3)
 
 
 def trinary_png(cells: Cells) -> bytes:

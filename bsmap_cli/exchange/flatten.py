@@ -10,6 +10,7 @@ from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.sampling import evaluate
 
 TOLERANCE_M = 0.001
+AT_ONCE = 1_000_000  # vertices
 LEAST_TOLERANCE_M = 1e-6  # what is written is rounded to no less
 
 
@@ -20,12 +21,15 @@ def polylines(selected: SelectedLevel, tolerance_m: float = TOLERANCE_M) -> list
     begin, piece = _intervals(selected, 0.5 * tolerance_m)
     points, _ = evaluate(level, pieces.curve[piece], begin)
     last, _ = evaluate(level, pieces.curve, pieces.end)
-    ends = np.cumsum(np.bincount(piece, minlength=len(pieces.curve)))
-    split = np.split(points, ends[:-1])
-    return [
-        simplified(np.concatenate((line, last[k : k + 1])), 0.5 * tolerance_m)
-        for k, line in enumerate(split[: len(pieces.curve)])
-    ]
+    counts = np.bincount(piece, minlength=len(pieces.curve)) + 1
+    ends = np.cumsum(counts)
+    vertices = np.empty((len(points) + len(last), 2))
+    is_last = np.zeros(len(vertices), bool)
+    is_last[ends - 1] = True
+    vertices[~is_last], vertices[is_last] = points, last
+    kept = _kept(vertices, ends - counts, ends - 1, 0.5 * tolerance_m)
+    wanted = np.cumsum(np.add.reduceat(kept, ends - counts, dtype=np.int64)) if len(ends) else ends
+    return np.split(vertices[kept], wanted[:-1])[: len(ends)]
 
 
 def spans_of(
@@ -70,22 +74,45 @@ def _intervals(
 
 def simplified(line: Points, tolerance_m: float) -> Points:
     """The polyline without the vertices it can miss (Ramer, Douglas and Peucker)."""
-    keep = np.zeros(len(line), bool)
-    keep[[0, -1]] = True
-    stack = [(0, len(line) - 1)]
-    while stack:
-        first, last = stack.pop()
-        if last - first < 2:
-            continue
-        way = line[last] - line[first]
-        offset = line[first + 1 : last] - line[first]
-        square = float(way @ way)
-        along = np.clip(offset @ way / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(offset))
-        off = offset - along[:, None] * way
-        distance = np.hypot(off[:, 0], off[:, 1])
-        worst = int(distance.argmax())
-        if distance[worst] > tolerance_m:
-            middle = first + 1 + worst
-            keep[middle] = True
-            stack += [(first, middle), (middle, last)]
-    return line[keep]
+    return line[_kept(line, np.array([0]), np.array([len(line) - 1]), tolerance_m)]
+
+
+def _kept(
+    vertices: Points, first: NDArray[np.int64], last: NDArray[np.int64], tolerance_m: float
+) -> NDArray[np.bool_]:
+    """Which vertices of many polylines are needed, from the first to the last one of each.
+
+    Some lines at a time, to spare memory; all stretches of theirs at once, round by round.
+    """
+    keep = np.zeros(len(vertices), bool)
+    keep[first] = keep[last] = True
+    groups = np.searchsorted(last, np.arange(AT_ONCE, len(vertices), AT_ONCE))
+    for stretches in zip(np.split(first, groups), np.split(last, groups), strict=True):
+        begin, end = stretches
+        while len(begin):
+            begin, end = _split(vertices, begin, end, tolerance_m)
+            keep[begin] = True
+    return keep
+
+
+def _split(
+    vertices: Points, first: NDArray[np.int64], last: NDArray[np.int64], tolerance_m: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Both halves of each stretch whose vertices stray, cut at the one that strays most."""
+    long = last - first >= 2
+    first, last = first[long], last[long]
+    inner = last - first - 1
+    starts = np.cumsum(inner) - inner
+    owner = np.repeat(np.arange(len(inner)), inner)
+    index = np.arange(len(owner)) + np.repeat(first + 1 - starts, inner)
+    way = vertices[last] - vertices[first]
+    square = np.einsum("ki,ki->k", way, way)
+    offset = vertices[index] - vertices[first[owner]]
+    along = np.einsum("ki,ki->k", offset, way[owner]) / np.where(square > 0.0, square, 1.0)[owner]
+    off = offset - np.clip(along, 0.0, 1.0)[:, None] * way[owner]
+    distance = np.hypot(off[:, 0], off[:, 1])
+    most = np.maximum.reduceat(distance, starts) if len(starts) else np.zeros(0)
+    worst = np.flatnonzero((distance == most[owner]) & (distance > tolerance_m))
+    strays, place = np.unique(owner[worst], return_index=True)
+    middle = index[worst[place]]
+    return np.concatenate((first[strays], middle)), np.concatenate((middle, last[strays]))
