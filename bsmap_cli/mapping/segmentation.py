@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.continuity import BEAM_GAPS, GapRule, cut_surfaces
 from bsmap_cli.sensor.gate import Returns
 from bsmap_cli.settings import setting
-
-BEAM_GAPS = 3.0  # neighbours on one surface, seen under 70 degrees from its normal, in beam steps
-NOISE_GAPS = 4.0  # the relative test of eq. (3) counts smaller gaps as this many sigma
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +31,9 @@ class SegmentationSettings:
     min_points: int = setting(5, "smaller clusters are dropped", symbol="gamma_min", minimum=2)
     min_length: float = setting(0.75, "shorter clusters are dropped [knot steps]", minimum=0.0)
     beam_gap: bool = setting(
-        True, "widen max_gap where beams lie far apart; off: the constant of eq. (3)"
+        True,
+        "widen max_gap where beams lie far apart or are noisy, and pass over lone beams that are "
+        "lost or astray; off: the constant of eq. (3)",
     )
     each_level: bool = setting(
         False, "segment anew for each knot step; off: once at the finest, and widen the bins"
@@ -80,43 +80,6 @@ class Clusters:
 
 
 @lean
-def _segment(
-    points: Points,
-    ranges: Vector,
-    beam_gap_rad: float,
-    max_gap_m: float,
-    rel_gap: float,
-    sigma_m: float,
-    min_points: int,
-    min_length_m: float,
-    bounds: NDArray[np.int64],
-) -> int:
-    """Write first and end of each cluster into `bounds`; their number."""
-    clusters = 0
-    start = 0
-    length = 0.0
-    previous_gap = math.inf
-    for i in range(1, len(ranges) + 1):
-        gap = math.inf
-        if i < len(ranges):
-            gap = math.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
-            widest = max(max_gap_m, beam_gap_rad * min(ranges[i], ranges[i - 1]))
-            floor = max(previous_gap, NOISE_GAPS * sigma_m)
-            if gap <= widest and gap <= rel_gap * floor:  # eq. (3)
-                length += gap
-                previous_gap = gap
-                continue
-        if i - start >= min_points and length >= min_length_m:
-            bounds[clusters, 0] = start
-            bounds[clusters, 1] = i
-            clusters += 1
-        start = i
-        length = 0.0
-        previous_gap = math.inf
-    return clusters
-
-
-@lean
 def _thin(
     points: Points,
     returns: Vector,
@@ -134,11 +97,10 @@ def _thin(
         while i < bounds[c, 1]:
             x = y = total = 0.0
             first = i
-            while i < bounds[c, 1] and (
-                i == first
-                or math.hypot(points[i, 0] - points[first, 0], points[i, 1] - points[first, 1])
-                < bin_m
-            ):
+            while i < bounds[c, 1]:
+                ahead_x, ahead_y = points[i, 0] - points[first, 0], points[i, 1] - points[first, 1]
+                if i > first and ahead_x * ahead_x + ahead_y * ahead_y >= bin_m * bin_m:
+                    break
                 x += returns[i] * points[i, 0]
                 y += returns[i] * points[i, 1]
                 total += returns[i]
@@ -159,12 +121,12 @@ def _tangents(points: Points, starts: NDArray[np.int64], reach_m: float, tangent
         for i in range(low, high + 1):
             a = b = i
             dx = dy = 0.0
-            while math.hypot(dx, dy) < reach_m and (a > low or b < high):
+            while dx * dx + dy * dy < reach_m * reach_m and (a > low or b < high):
                 a = max(low, a - 1)
                 b = min(high, b + 1)
                 dx = points[b, 0] - points[a, 0]
                 dy = points[b, 1] - points[a, 1]
-            norm = math.hypot(dx, dy) + 1e-300
+            norm = math.sqrt(dx * dx + dy * dy) + 1e-300
             tangents[i, 0] = dx / norm
             tangents[i, 1] = dy / norm
 
@@ -179,19 +141,25 @@ def find_clusters(
 ) -> Clusters:
     """Cut the returns where the surface ends, eq. (3), and thin each cluster into bins."""
     m = len(returns)
-    bounds = np.empty((m, 2), np.int64)
-    clusters = _segment(
+    spaced = settings.beam_gap
+    rule = GapRule(
+        max_gap_m=settings.max_gap * knot_step_m,
+        rel_gap=settings.rel_gap,
+        beam_gap_rad=BEAM_GAPS * returns.beam_step_rad if spaced else 0.0,
+        sigma_m=sigma_m if spaced else 0.0,
+        fewest=settings.min_points,
+    )
+    kept, bounds = np.empty((m, 2)), np.empty((m, 2), np.int64)
+    clusters = cut_surfaces(
         returns.points_body,
         returns.ranges_m,
-        BEAM_GAPS * returns.beam_step_rad if settings.beam_gap else 0.0,
-        settings.max_gap * knot_step_m,
-        settings.rel_gap,
-        sigma_m if settings.beam_gap else 0.0,
-        settings.min_points,
+        returns.beams if spaced else np.arange(m),
+        rule,
         settings.min_length * knot_step_m,
+        kept,
         bounds,
     )
     points, counts = np.empty((m, 2)), np.empty(m)
     starts = np.empty(clusters + 1, np.int64)
-    n = _thin(returns.points_body, np.ones(m), bounds[:clusters], bin_m, points, counts, starts)
+    n = _thin(kept, np.ones(m), bounds[:clusters], bin_m, points, counts, starts)
     return Clusters.with_tangents(points[:n], counts[:n], starts, knot_step_m, sigma_m)

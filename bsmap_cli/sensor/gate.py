@@ -43,13 +43,14 @@ class SensorSettings:
 class Returns:
     """The returns of one scan, counter-clockwise.
 
-    points_body : (m, 2) float64 [m], base frame; ranges_m : (m,) [m]; beam_step_rad : angle from
-    one beam to the next; on a full circle the list starts behind the widest gap, so that no
-    surface is cut at the seam.
+    points_body : (m, 2) float64 [m], base frame; ranges_m : (m,) [m]; beams : (m,) which beam each
+    is, rising; beam_step_rad : angle from one beam to the next. On a full circle the list starts
+    behind the widest gap, so that no surface is cut at the seam, and counts on beyond it.
     """
 
     points_body: Points
     ranges_m: Vector
+    beams: NDArray[np.int64]
     beam_step_rad: float
 
     def __len__(self) -> int:
@@ -84,6 +85,7 @@ def _gather(
     beam_time: float,
     points: Points,
     lengths: Vector,
+    returned: NDArray[np.int64],
 ) -> int:
     """Write the returns in the base frame of the first ray's instant; their number."""
     cos, sin = math.cos(laser[2]), math.sin(laser[2])
@@ -108,6 +110,7 @@ def _gather(
         points[count, 0] = bx
         points[count, 1] = by
         lengths[count] = r
+        returned[count] = i
         count += 1
     return count
 
@@ -142,6 +145,7 @@ def find_returns(
     )
     near, far = range_limits(scan, settings, knot_step_m)
     points, lengths = np.empty((beams, 2)), np.empty(beams)
+    returned = np.empty(beams, np.int64)
     deskew = twist_body is not None and settings.deskew == "auto"
     count = _gather(
         scan.ranges_m,
@@ -155,10 +159,12 @@ def find_returns(
         scan.time_increment_s if deskew else 0.0,
         points,
         lengths,
+        returned,
     )
-    points, lengths = points[:count], lengths[:count]
+    points, lengths, returned = points[:count], lengths[:count], returned[:count]
     if beams * scan.angle_increment_rad > math.tau - 1.5 * scan.angle_increment_rad and count > 2:
         gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
         seam = int(np.argmax(gaps))
         points, lengths = np.roll(points, -seam, axis=0), np.roll(lengths, -seam)
-    return Returns(points, lengths, scan.angle_increment_rad)
+        returned = np.concatenate((returned[seam:], returned[:seam] + beams))
+    return Returns(points, lengths, returned, scan.angle_increment_rad)

@@ -95,7 +95,7 @@ def test_each_level_is_segmented_by_its_own_gamma_abs():
     """A row of posts 0.2 m apart is one cluster at Delta = 0.4 m and none at 0.1 m."""
     x = np.arange(0.0, 8.0, 0.2)
     points = np.column_stack((x, np.full_like(x, 2.0)))
-    returns = Returns(points, np.hypot(*points.T), 0.004)
+    returns = Returns(points, np.hypot(*points.T), np.arange(len(x)), 0.004)
     levels = scan_levels(returns, (0.4, 0.1), PAPER.segmentation, PAPER.fitting, 0.01)
     assert [len(level) for level in levels] == [1, 0]
     assert len(levels[0].points) == len(x)  # nothing is thinned
