@@ -60,7 +60,8 @@ def _seen_along(
         dx, dy = step * (points[k, 0] - points[i, 0]), step * (points[k, 1] - points[i, 1])
         length = math.sqrt(dx * dx + dy * dy)
         if length >= reach_m:
-            return (dx * ux + dy * uy) / length
+            cosine: float = (dx * ux + dy * uy) / length
+            return cosine
         k += step
     return UNSEEN
 
@@ -76,7 +77,8 @@ def _widest_m(ranges: Vector, i: int, j: int, beams_apart: int, rule: GapRule) -
     """The longest gap between returns i and j of one surface."""
     spacing = rule.beam_gap_rad * beams_apart * min(ranges[i], ranges[j])
     noise = _noise_m(rule)
-    return max(rule.max_gap_m, math.sqrt(spacing * spacing + noise * noise))
+    explained: float = math.sqrt(spacing * spacing + noise * noise)
+    return max(rule.max_gap_m, explained)
 
 
 @inlined
@@ -115,7 +117,8 @@ def _bridged(
     """Do returns i and j lie on one surface, though the beams between them tell nothing?
 
     Spacing explains a gap of so many beams; one that is longer than eq. (3) allows must also run
-    along the surface on one side of it: across, it is the step from one surface to another.
+    along the surface on one side of it: across, it is the step from one surface to another. Where
+    returns lie between, both sides must say so: they may be of a surface of their own.
     """
     if not _spanned(points, ranges, beams, i, j, rule):
         return False
@@ -126,6 +129,8 @@ def _bridged(
     reach = max(0.5 * gap, NOISE_GAPS * rule.sigma_m)
     before = _seen_along(points, i, -1, first - 1, reach, ux, uy)
     behind = _seen_along(points, j, 1, len(ranges), reach, ux, uy)
+    if j > i + 1 and min(before, behind) > UNSEEN:
+        return min(before, behind) >= SAME_WAY
     return max(before, behind) >= SAME_WAY
 
 
