@@ -63,7 +63,9 @@ def _reader(names: list[str], sources: list[Source], options: ReadOptions) -> Lo
     if not known:
         raise LogError(f"{', '.join(names)} holds no log: {_KNOWN}")
     parts = [source for source, _ in known]
-    name = parts[0].name if len(parts) == 1 else f"{Path(names[0]).name} ({len(parts)} files)"
+    first = Path(names[0])
+    named = first.name or first.resolve().name
+    name = parts[0].name if len(parts) == 1 else f"{named} ({len(parts)} files)"
     kinds = {kind for _, kind in known}
     if kinds <= set(_CONTAINERS):
         containers = [_CONTAINERS[kind](source) for source, kind in known]

@@ -128,7 +128,9 @@ def _parts(source: Source) -> list[Source]:
         )
     except OSError as error:
         raise LogError(f"cannot open {path}: {error.strerror or error}") from error
-    children = [child for child in children if not child.is_dir() or _is_bag_folder(child)]
+    # a pipe or a socket in a folder is nobody's log, and would be waited for
+    special = [child for child in children if child.exists() and not _holds_data(child)]
+    children = [child for child in children if child not in special]
     dangling = tuple(child.name for child in children if not child.exists())
     children = [child for child in children if child.name not in dangling]
     if not children:
@@ -153,6 +155,10 @@ def _missing_parts(folder: Path, names: list[str]) -> tuple[str, ...]:
     listed = re.search(r"^ *relative_file_paths:[ ]*\n((?:[ ]*- .*\n)*)", text, re.MULTILINE)
     parts = re.findall(r"- *[\"']?([^\"'\n]+)", listed[1]) if listed else []
     return tuple(part for part in parts if not any(name.startswith(part) for name in names))
+
+
+def _holds_data(path: Path) -> bool:
+    return path.is_file() or (path.is_dir() and _is_bag_folder(path))
 
 
 def _is_bag_folder(path: Path) -> bool:

@@ -1,6 +1,7 @@
 """The same scans in every container, encoding and compression are the same scans."""
 
 import io
+import os
 import subprocess
 import sys
 
@@ -95,6 +96,7 @@ def test_parts_in_natural_order(suffix, tmp_path):
         made.mkdir()
         MAKERS[kind](made / "log", part).rename(path)
     (folder / "README.txt").write_text("not a log")
+    os.mkfifo(folder / "pipe")  # nobody writes to it
     (folder / ".hidden.csv").write_text("t,r0,r1")
     assert_same(read(folder)[0], SCANS[:120])
     files = sorted(folder.glob(f"part*.{suffix}"))
