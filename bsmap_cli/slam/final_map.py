@@ -16,7 +16,7 @@ from bsmap_cli.mapping.thaw import thaw_level
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
 from bsmap_cli.slam.keyframes import Keyframe
-from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.near_registration import register_near
 from bsmap_cli.slam.uncertainty import isotropic_information
 
 if TYPE_CHECKING:
@@ -42,7 +42,9 @@ class FinalMapSettings:
     all_levels: bool = setting(
         False, "make the coarser levels of the finished map too, not the finest alone"
     )
-    levels: int = setting(2, "levels of the ladder, from the finest up, used for that", minimum=1)
+    levels: int = setting(
+        2, "levels of the ladder, from the finest up, that the first round uses", minimum=1
+    )
 
 
 def build_map(
@@ -81,10 +83,9 @@ def refine_poses(
     for k, keyframe in enumerate(keyframes):
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
         clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
-        result = register_down(
+        result = register_near(
             levels,
             clusters,
-            poses[k],
             poses[k],
             prior,
             sigma_m=sigma_m,
@@ -106,8 +107,9 @@ def final_map(
 
     old : a map that is gone on with, in the frame of the poses: a level for each knot step.
     """
-    ladder = settings.ladder[-settings.final_map.levels :]
-    for _ in range(settings.final_map.rounds):
+    for turn in range(settings.final_map.rounds):
+        # once all poses agree with one map, none needs to be drawn in from farther off
+        ladder = settings.ladder[-(settings.final_map.levels if turn == 0 else 1) :]
         levels = build_map(poses, keyframes, ladder, settings, sigma_m, old[-len(ladder) :])
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def register_down(
-    levels: list[CurveMap],
+    levels: Sequence[CurveMap],
     clusters: Sequence[Clusters],
     start_pose: Vector,
     prior_pose: Vector,
@@ -37,7 +37,7 @@ def register_down(
 
 
 def track_down(
-    levels: list[CurveMap],
+    levels: Sequence[CurveMap],
     clusters: Sequence[Clusters],
     start_pose: Vector,
     prior_pose: Vector,
