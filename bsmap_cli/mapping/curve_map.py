@@ -135,6 +135,14 @@ class CurveMap:
         if crowded:
             _reindex(arrays, self.matrix, self.knot_step_m)
 
+    def trim(self) -> None:
+        """Give back the room for control points to come; `reserve` makes it again."""
+        used = int(self.arrays.sizes[1])
+        by_row = ("points", "weights", "owner", "spans", "next_span", "span_cell")
+        self.arrays = self.arrays._replace(
+            **{name: getattr(self.arrays, name)[:used].copy() for name in by_row}
+        )
+
     def moved(self, pose_new_old: SE2) -> CurveMap:
         """The same curves in another frame: exact, only the index is made anew."""
         arrays = self.arrays

@@ -88,6 +88,7 @@ def refine_poses(
             clusters,
             poses[k],
             prior,
+            enough=settings.registration.shortcut,
             sigma_m=sigma_m,
             settings=settings.registration,
         )

@@ -138,7 +138,7 @@ class LocalSlam:
         self.merge_seconds += time.perf_counter() - began
         full = self.settings.submaps.keyframes
         if len(self.older.keyframes) >= full and len(self.submaps) > self.finished + 1:
-            self.older.forget_likelihood()
+            self.older.finish()
             self.finished += 1
         if len(self.submaps[-1].keyframes) >= full // 2 and len(self.submaps) == self.finished + 1:
             self._begin_submap()

@@ -164,6 +164,7 @@ class LoopCloser:
             clusters,
             guess,
             isotropic_information(deviation),
+            enough=settings.loops.min_inliers,
             sigma_m=self.local.sigma_m,
             settings=settings.registration,
         )

@@ -74,6 +74,11 @@ class Submap:
             self._likelihood = (len(self.keyframes), built)
         return self._likelihood[1]
 
+    def finish(self) -> None:
+        """It will hold no further keyframe: give back what only a growing one needs."""
+        self.levels[-1].trim()
+        self.forget_likelihood()
+
     def forget_likelihood(self) -> None:
         """Give the memory back."""
         self._likelihood = None
