@@ -14,7 +14,7 @@ from tests.mapping.walls import MATRIX, STEP, arc, insert, line, live_curves, ne
 seeds = st.integers(0, 2**32)
 
 
-def random_map(seed, scans=12, rows=256):
+def random_map(seed, scans=12, rows=256, *, trimmed=False):
     """Walls and arcs seen again and again in parts, from an almost empty start to many curves."""
     random = np.random.default_rng(seed)
     curve_map = new_map(rows=rows)
@@ -27,7 +27,19 @@ def random_map(seed, scans=12, rows=256):
             begin = random.uniform(-3.0, 3.0)
             parts.append(arc(corners[0], 0.6, begin, begin - random.uniform(0.5, 3.0)))
         insert(curve_map, *parts)
+        if trimmed:
+            curve_map.trim()
     return curve_map
+
+
+@given(seeds)
+@settings(max_examples=10, deadline=None)
+def test_a_trimmed_map_holds_the_same_and_still_grows(seed):
+    kept, trimmed = random_map(seed), random_map(seed, trimmed=True)
+    assert len(trimmed.arrays.weights) == trimmed.arrays.sizes[1]
+    for one, other in zip(live_curves(kept), live_curves(trimmed), strict=True):
+        for value, expected in zip(other, one, strict=True):
+            assert np.array_equal(value, expected)
 
 
 def usable_spans(curve_map):

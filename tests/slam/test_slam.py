@@ -233,3 +233,16 @@ def test_tracking_may_be_lost_with_any_number_of_keyframes_in_a_submap(before, o
     assert len(result.figures["tracking_lost"]) == 1
     assert np.isfinite(result.trajectory.poses).all()
     assert len(result.document.finest) > 0
+
+
+@pytest.mark.parametrize("count", range(1, 8))
+def test_a_log_may_end_just_as_a_submap_begins(count):
+    """The last submap then holds no keyframe, and where it lies nobody asks."""
+    settings = SlamSettings(
+        keyframes=KeyframeSettings(distance=0.0),
+        submaps=SubmapSettings(keyframes=4),
+        final_map=FinalMapSettings(rebuild=False),
+    )
+    result = run(list(itertools.islice(simulated("wall").scans(), count)), settings)
+    assert result.figures["keyframes"] == count
+    assert len(result.document.finest) > 0
