@@ -88,7 +88,6 @@ def refine_poses(
             clusters,
             poses[k],
             prior,
-            enough=settings.registration.shortcut,
             sigma_m=sigma_m,
             settings=settings.registration,
         )

@@ -14,8 +14,8 @@ from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.local_slam import LocalSlam
-from bsmap_cli.slam.near_registration import register_near
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.submap import Submap
@@ -159,12 +159,12 @@ class LoopCloser:
                 return
             guess = peak.pose
         deviation = (0.5 * DIRECT_STEPS * unit, 0.1)
-        result = register_near(
+        result = register_down(
             submap.levels,
             clusters,
             guess,
+            guess,
             isotropic_information(deviation),
-            enough=settings.loops.min_inliers,
             sigma_m=self.local.sigma_m,
             settings=settings.registration,
         )

@@ -17,13 +17,12 @@ def register_near(
     pose: Vector,
     prior_information: Points,
     *,
-    enough: float,
     sigma_m: float,
     settings: RegistrationSettings,
 ) -> RegistrationResult:
-    """Start from `pose` (3,), held to it by the prior.
+    """Start from `pose` (3,), held to it by the prior; most scans never ask the coarser levels.
 
-    enough : share of the points that must lie on the finest level to leave the coarser ones out.
+    Not for closures: what the finest level explains from a searched pose may be beside the place.
     """
     if len(levels) > 1:
         finest = register(
@@ -35,7 +34,7 @@ def register_near(
             sigma_m=sigma_m,
             settings=settings,
         )
-        if finest.inlier_ratio >= enough and not finest.degenerate:
+        if finest.inlier_ratio >= settings.shortcut and not finest.degenerate:
             return finest
     return register_down(
         levels, clusters, pose, pose, prior_information, sigma_m=sigma_m, settings=settings
