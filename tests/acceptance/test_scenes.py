@@ -205,8 +205,19 @@ def test_scans_a_metre_apart_are_enough(scene):
     assert sparse.off_m <= FINEST_M
 
 
+@pytest.mark.parametrize("odometry", [True, False])
+@pytest.mark.parametrize("poor", ["dropout_share", "outlier_share"])
+def test_half_of_all_beams_lost_or_one_in_twenty_astray_leave_walls_whole(poor, odometry):
+    share = {"dropout_share": 0.5, "outlier_share": 0.05}[poor]
+    office = drive("office", rate_hz=10.0, odometry=odometry, **{poor: share})
+    office.assert_no_wrong_closure()
+    office.assert_whole()
+    assert office.off_m <= 0.5 * FINEST_M
+
+
 @pytest.mark.xfail(
-    reason="lone outliers cut bare walls to pieces, whose bent ends feign to tell the way along"
+    reason="far walls, four times as noisy as near ones, end in bends that feign to tell the way; "
+    "one drive in three errs by more"
 )
 def test_rooms_seen_four_metres_far_with_one_beam_in_twenty_astray():
     office = drive("office", "urg04lx")
