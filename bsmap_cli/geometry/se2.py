@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ def wrap_angle(angle_rad: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
-@dataclass(frozen=True, slots=True)
-class SE2:
+class SE2(NamedTuple):
     """Rigid motion `(x, y, theta)`: metres and radians, theta in (-pi, pi].
 
     `pose_a_b @ points_b -> points_a`; `pose_a_b @ pose_b_c -> pose_a_c`. The paper's
@@ -44,7 +43,7 @@ class SE2:
 
     def as_array(self) -> Vector:
         """(3,) float64: x, y, theta."""
-        return np.array([self.x, self.y, self.theta])
+        return np.array(self)
 
     def inverse(self) -> SE2:
         """The motion back."""
@@ -53,14 +52,11 @@ class SE2:
             -cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap_angle(-self.theta)
         )
 
-    def compose(self, other: SE2) -> SE2:
-        """`self` after `other`."""
-        cos, sin = math.cos(self.theta), math.sin(self.theta)
-        return SE2(
-            self.x + cos * other.x - sin * other.y,
-            self.y + sin * other.x + cos * other.y,
-            wrap_angle(self.theta + other.theta),
-        )
+    def relative_to(self, origin: SE2) -> SE2:
+        """`origin.inverse() @ self`: this pose in the frame of another one."""
+        cos, sin = math.cos(origin.theta), math.sin(origin.theta)
+        dx, dy = self.x - origin.x, self.y - origin.y
+        return SE2(cos * dx + sin * dy, cos * dy - sin * dx, wrap_angle(self.theta - origin.theta))
 
     def transform(self, points: Points) -> Points:
         """Eq. (2): (m, 2) points of the inner frame, expressed in the outer one [m]."""
@@ -69,4 +65,9 @@ class SE2:
         return np.stack((cos * x - sin * y + self.x, sin * x + cos * y + self.y), axis=-1)
 
     def __matmul__(self, other: SE2) -> SE2:
-        return self.compose(other)
+        cos, sin = math.cos(self.theta), math.sin(self.theta)
+        return SE2(
+            self.x + cos * other.x - sin * other.y,
+            self.y + sin * other.x + cos * other.y,
+            wrap_angle(self.theta + other.theta),
+        )

@@ -61,7 +61,7 @@ def solve_full_graph(
                 loop=False,
             )
     for k in range(1, count):
-        step = keyframes[k - 1].pose_local.inverse() @ keyframes[k].pose_local
+        step = keyframes[k].pose_local.relative_to(keyframes[k - 1].pose_local)
         way = math.hypot(step.x, step.y)
         deviation = way_deviation(
             way, unit, coasted_m=keyframes[k].coasted_m, weak=keyframes[k].weak

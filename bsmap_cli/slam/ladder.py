@@ -43,13 +43,15 @@ def track_down(
     prior_pose: Vector,
     prior_information: Points,
     *,
+    explained: float,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
     """Register the scan that follows the last one, by the method that is set.
 
     Scans that follow each other closely begin within reach of the finest level, and most end
-    there. Where curves are registered to curves, the points say in the end how well the pose fits.
+    there. Of new ground less lies on the map, from any pose: what the last scan had on it,
+    `explained`, is the measure. Where curves are registered to curves, the points say in the end how well the pose fits.
     """
     method = settings.registration.method
     if method == "points":
@@ -62,7 +64,8 @@ def track_down(
             sigma_m=sigma_m,
             settings=settings.registration,
         )
-        if quick.inlier_ratio >= settings.registration.shortcut and not quick.degenerate:
+        enough = max(settings.registration.shortcut * explained, settings.recovery.search_below)
+        if quick.inlier_ratio >= enough and not quick.degenerate:
             return quick
     by_curves = {"points": 0, "joint_first": 1}.get(method, len(levels))
     pose = start_pose

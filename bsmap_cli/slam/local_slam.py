@@ -48,6 +48,7 @@ class LocalSlam:
     _pose: SE2 = field(default_factory=SE2.identity)
     _lost_scans: int = 0
     _coasted_m: float = 0.0
+    _explained: float = 1.0
     _cadence: Cadence = field(default_factory=Cadence)
     _predictor: Predictor = field(init=False)
 
@@ -82,6 +83,7 @@ class LocalSlam:
             self.older.to_submap(self._pose),
             prediction,
             blind=blind,
+            explained=self._explained,
             sigma_m=self.sigma_m,
             settings=self.settings,
         )
@@ -94,15 +96,15 @@ class LocalSlam:
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
         measured = told and not lost and not result.degenerate
-        self._predictor.observe(self._pose.inverse() @ pose, pose_odom_base, measured=measured)
-        self._pose = pose
+        self._predictor.observe(pose.relative_to(self._pose), pose_odom_base, measured=measured)
+        self._pose, self._explained = pose, result.inlier_ratio
         keyframe = None
         if self._lost_scans >= self.settings.recovery.patience:
             self._begin_anew()
             keyframe = self._insert(scan_index, clusters, None, True)
             self._lost_scans = 0
         elif not lost and told:
-            moved = self.keyframes[-1].pose_local.inverse() @ pose
+            moved = pose.relative_to(self.keyframes[-1].pose_local)
             if is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1]):
                 keyframe = self._insert(scan_index, clusters, result, False)
         return Tracked(pose, keyframe, lost, result.degenerate > 0)
@@ -134,7 +136,7 @@ class LocalSlam:
         self._coasted_m = 0.0
         began = time.perf_counter()
         for submap in self.submaps[self.finished :]:
-            submap.insert(keyframe.index, clusters, submap.to_submap(self._pose))
+            submap.insert(keyframe, clusters, self.sigma_m)
         self.merge_seconds += time.perf_counter() - began
         full = self.settings.submaps.keyframes
         if len(self.older.keyframes) >= full and len(self.submaps) > self.finished + 1:

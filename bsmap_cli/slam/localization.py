@@ -106,6 +106,7 @@ class Localizer:
             self._pose,
             prediction,
             blind=stretch if scan.pose_odom_base is None else 1.0,
+            explained=self._usual_ratio,
             growing=False,
             sigma_m=self._front.sigma_m,
             settings=self._wary(),

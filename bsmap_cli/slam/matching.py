@@ -30,6 +30,7 @@ def match_scan(
     prediction: Prediction,
     *,
     blind: float,
+    explained: float,
     growing: bool = True,
     sigma_m: float,
     settings: SlamSettings,
@@ -37,7 +38,8 @@ def match_scan(
     """Register the scan that follows the one at `last`, a pose in the submap's frame.
 
     blind : usual scan times that passed without odometry; in a gap the robot may have gone
-    anywhere near, and even a fair match may be of another place. growing : the map ends where the
+    anywhere near, and even a fair match may be of another place. explained : share of the last
+    scan's points that lay on the map. growing : the map ends where the
     robot has been, and not where the walls do.
 
     A corridor holds its few features out of reach as soon as the robot starts, stops or turns
@@ -53,6 +55,7 @@ def match_scan(
         predicted,
         predicted,
         information,
+        explained=explained,
         sigma_m=sigma_m,
         settings=settings,
     )

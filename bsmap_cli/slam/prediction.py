@@ -88,7 +88,7 @@ class Predictor:
         """The step from the last scan to this one; `observe` must follow."""
         settings = self.settings
         if pose_odom_base is not None and self._odometry is not None:
-            step = self._odometry.inverse() @ pose_odom_base
+            step = pose_odom_base.relative_to(self._odometry)
             way = math.hypot(step.x, step.y)
             return Prediction(
                 step,
@@ -108,7 +108,7 @@ class Predictor:
     def observe(self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool) -> None:
         """Tell what the step turned out to be, and whether the walls said so in all directions."""
         if measured:
-            surprise = self.last_step.inverse() @ step
+            surprise = step.relative_to(self.last_step)
             settings = self.settings
             floor_m = settings.motion_floor * self.unit_m / settings.motion_margin
             floor_rad = 0.1 * math.radians(settings.motion_sigma_deg) / settings.motion_margin

@@ -50,8 +50,8 @@ class RegistrationSettings:
     )
     shortcut: float = setting(
         0.9,
-        "share of points that must lie on the finest level, from the prediction on, to leave the "
-        "coarser levels out; above 1: never",
+        "of the share of the last scan's points that lay on the map, so much must lie on the finest "
+        "level, from the prediction on, to leave the coarser levels out; large: never",
         minimum=0.0,
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.fading import fade
-from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.settings import setting
+from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.likelihood import Likelihood, build_likelihood
+from bsmap_cli.slam.submap_levels import SubmapLevels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +37,8 @@ class Submap:
     def __init__(self, index: int, pose_local: SE2, settings: MappingSettings) -> None:
         self.index = index
         self.pose_local = pose_local
-        self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
+        self._drawn = SubmapLevels(settings)
+        self.levels: Sequence[CurveMap] = self._drawn
         self.keyframes: list[int] = []
         self.viewpoints: list[tuple[float, float]] = []
         self.extent_m = 0.0
@@ -45,16 +47,15 @@ class Submap:
 
     def to_submap(self, pose_local: SE2) -> SE2:
         """A pose of the local frame, in the submap's."""
-        return self.pose_local.inverse() @ pose_local
+        return pose_local.relative_to(self.pose_local)
 
-    def insert(self, keyframe: int, clusters: Sequence[Clusters], pose_submap_base: SE2) -> None:
+    def insert(self, keyframe: Keyframe, clusters: Sequence[Clusters], sigma_m: float) -> None:
         """Let a keyframe change the curves."""
-        pose = pose_submap_base.as_array()
-        for level, seen in zip(self.levels, clusters, strict=True):
-            insert_clusters(level, seen, pose, self._settings)
-        self.keyframes.append(keyframe)
-        self.viewpoints.append((pose_submap_base.x, pose_submap_base.y))
-        self.extent_m = max(self.extent_m, math.hypot(pose_submap_base.x, pose_submap_base.y))
+        pose = self.to_submap(keyframe.pose_local)
+        self._drawn.insert(clusters, keyframe.clusters, pose.as_array(), sigma_m)
+        self.keyframes.append(keyframe.index)
+        self.viewpoints.append((pose.x, pose.y))
+        self.extent_m = max(self.extent_m, math.hypot(pose.x, pose.y))
 
     def fade(self, sight: Sight, pose_submap_base: SE2, sigma_m: float) -> None:
         """Let what a keyframe looks through lose weight."""

@@ -131,7 +131,7 @@ class SubmapGraph:
         weak = False
         for index in range(begin + 1, min(end, len(local.keyframes))):
             frame = local.keyframes[index]
-            step = local.keyframes[index - 1].pose_local.inverse() @ frame.pose_local
+            step = frame.pose_local.relative_to(local.keyframes[index - 1].pose_local)
             way += math.hypot(step.x, step.y)
             coasted += frame.coasted_m
             weak = weak or frame.weak

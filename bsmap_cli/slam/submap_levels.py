@@ -1,0 +1,66 @@
+"""The curves of a submap at each knot step, the coarser ones drawn when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+from bsmap_cli.geometry.se2 import Vector
+from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.mapping_settings import MappingSettings
+from bsmap_cli.mapping.scan_levels import ScanLevels
+from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.slam.keyframes import CompactClusters
+
+
+class SubmapLevels(Sequence[CurveMap]):
+    """Curve maps, coarse to fine.
+
+    Most scans are tracked on the finest level alone, and in most submaps no loop is sought: their
+    coarser levels would be drawn for nobody.
+    """
+
+    def __init__(self, settings: MappingSettings) -> None:
+        self._settings = settings
+        self._levels = [CurveMap(step, settings.degree) for step in settings.ladder]
+        self._waiting: list[tuple[CompactClusters, Vector, float]] = []
+
+    def __len__(self) -> int:
+        return len(self._levels)
+
+    @overload
+    def __getitem__(self, index: int) -> CurveMap: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[CurveMap]: ...
+
+    def __getitem__(self, index: int | slice) -> CurveMap | list[CurveMap]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if self._waiting and range(len(self))[index] < len(self) - 1:
+            self._draw_waiting()
+        return self._levels[index]
+
+    def insert(
+        self,
+        clusters: Sequence[Clusters],
+        packed: CompactClusters,
+        pose_submap_base: Vector,
+        sigma_m: float,
+    ) -> None:
+        """Let a keyframe change the finest level now; `packed` holds its finest clusters."""
+        if self._settings.segmentation.each_level:  # coarse clusters do not follow from fine ones
+            for level, seen in zip(self._levels, clusters, strict=True):
+                insert_clusters(level, seen, pose_submap_base, self._settings)
+            return
+        insert_clusters(self._levels[-1], clusters[-1], pose_submap_base, self._settings)
+        self._waiting.append((packed, pose_submap_base, sigma_m))
+
+    def _draw_waiting(self) -> None:
+        ladder, fitting = self._settings.ladder, self._settings.fitting
+        for packed, pose, sigma_m in self._waiting:
+            scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
+            for level, seen in zip(self._levels[:-1], scan, strict=False):
+                insert_clusters(level, seen, pose, self._settings)
+        self._waiting.clear()
