@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bsmap_cli.geometry.se2 import Points, Vector
@@ -51,7 +50,8 @@ def track_down(
 
     Scans that follow each other closely begin within reach of the finest level, and most end
     there. Of new ground less lies on the map, from any pose: what the last scan had on it,
-    `explained`, is the measure. Where curves are registered to curves, the points say in the end how well the pose fits.
+    `explained`, is the measure. Where curves are registered to curves, the points say in the end
+    how well the pose fits.
     """
     method = settings.registration.method
     if method == "points":
@@ -93,4 +93,4 @@ def track_down(
         settings=settings.registration,
         iterations=1,
     )
-    return replace(judged, pose=pose)
+    return judged._replace(pose=pose)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,8 +49,7 @@ class PredictionSettings:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Prediction:
+class Prediction(NamedTuple):
     """`step` is the motion in the body frame since the last scan.
 
     sigma_m, sigma_rad : how far the true step may be off. drift_m : what a step adds to the error

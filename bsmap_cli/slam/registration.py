@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.kernels import (
-    solve3,
-)
+from bsmap_cli.geometry.kernels import solve3
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -50,8 +49,8 @@ class RegistrationSettings:
     )
     shortcut: float = setting(
         0.9,
-        "of the share of the last scan's points that lay on the map, so much must lie on the finest "
-        "level, from the prediction on, to leave the coarser levels out; large: never",
+        "so much of what the last scan had on the map must lie on the finest level, from the "
+        "prediction on, to leave the coarser levels out; 2: never",
         minimum=0.0,
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
@@ -63,8 +62,7 @@ class RegistrationSettings:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class RegistrationResult:
+class RegistrationResult(NamedTuple):
     """How a registration went.
 
     pose : (3,) x, y [m], theta [rad] of the body in the map frame.
@@ -193,11 +191,12 @@ def register(
         tally,
     )
     n = len(clusters.points)
+    inliers, squares_m2 = float(tally[0]), float(tally[1])
     return RegistrationResult(
         pose=pose,
         information=hessian,
-        inlier_ratio=tally[0] / max(n, 1),
-        rms_m=math.sqrt(tally[1] / max(tally[0], 1.0)),
+        inlier_ratio=inliers / max(n, 1),
+        rms_m=math.sqrt(squares_m2 / max(inliers, 1.0)),
         iterations=steps,
         degenerate=degenerate,
         points=n,
