@@ -28,7 +28,10 @@ class SegmentationSettings:
         symbol="gamma_abs",
         minimum=0.0,
     )
-    min_points: int = setting(5, "smaller clusters are dropped", symbol="gamma_min", minimum=2)
+    min_points: int = setting(5, "smaller clusters are not drawn", symbol="gamma_min", minimum=2)
+    faint_points: int = setting(
+        3, "SLAM is guided by smaller clusters too, down to this size, and draws none", minimum=2
+    )
     min_length: float = setting(0.75, "shorter clusters are dropped [knot steps]", minimum=0.0)
     beam_gap: bool = setting(
         True,
@@ -55,6 +58,17 @@ class Clusters:
 
     def __len__(self) -> int:
         return len(self.starts) - 1
+
+    def drawn(self, min_points: int) -> Clusters:
+        """Without the clusters of fewer raw returns."""
+        returns = np.add.reduceat(self.counts, self.starts[:-1]) if len(self) else np.zeros(0)
+        kept = returns >= min_points
+        if kept.all():
+            return self
+        sizes = np.diff(self.starts)
+        chosen = np.repeat(kept, sizes)
+        starts = np.concatenate(([0], np.cumsum(sizes[kept])))
+        return Clusters(self.points[chosen], self.tangents[chosen], self.counts[chosen], starts)
 
     def coarser(self, knot_step_m: float, bin_m: float, sigma_m: float) -> Clusters:
         """The same clusters in wider bins, as a coarser level of the ladder sees them."""
