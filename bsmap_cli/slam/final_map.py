@@ -57,7 +57,8 @@ def build_map(
 ) -> list[CurveMap]:
     """Algorithm 1 over all keyframes; one map for each knot step of `ladder`.
 
-    Clusters below `segmentation.min_points` are left out. old : the levels, as many, that the keyframes go on with; empty: they begin with nothing.
+    Clusters below `segmentation.min_points` are left out. old : the levels, as many, that the
+    keyframes go on with; empty: they begin with nothing.
     """
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
