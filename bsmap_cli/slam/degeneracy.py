@@ -4,14 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import part
+from bsmap_cli.geometry.compiled import inlined, part
 from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
 
+SURE = 3.0  # deviations of a normal's noise; what a point tells beyond them is no noise
+ENOUGH = 0.1  # of what noise feigns: so much that is no noise shows a direction
+
+
+@inlined
+def _certain(jacobian: Points, x: float, y: float, turn: float) -> float:
+    """Information along a direction from points whose normals noise alone does not explain."""
+    total = 0.0
+    for j in range(len(jacobian)):
+        weight = jacobian[j, 3]
+        if weight > 0.0:
+            along = jacobian[j, 0] * x + jacobian[j, 1] * y + jacobian[j, 2] * turn
+            total += weight * max(0.0, along * along - SURE * SURE * jacobian[j, 4])
+    return total
+
+
 @part
 def keep_unobserved(
-    hessian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
+    hessian: Points, jacobian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
 ) -> int:
     """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
 
@@ -30,6 +46,9 @@ def keep_unobserved(
     found = 0
     for k in range(3):
         if values[k] > least:
+            continue
+        x, y, turn = vectors[0, k], vectors[1, k], vectors[2, k] / lever
+        if _certain(jacobian, x, y, turn) > ENOUGH * least:
             continue
         found += 1
         missing = 0.0

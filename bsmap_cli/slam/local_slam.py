@@ -95,7 +95,9 @@ class LocalSlam:
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
         measured = told and not lost and not result.degenerate
-        self._predictor.observe(pose.relative_to(self._pose), pose_odom_base, measured=measured)
+        step = pose.relative_to(self._pose)
+        sigma_m = result.worst_sigma_m if measured else 0.0
+        self._predictor.observe(step, pose_odom_base, measured=measured, sigma_m=sigma_m)
         self._pose, self._explained = pose, result.inlier_ratio
         keyframe = None
         if self._lost_scans >= self.settings.recovery.patience:

@@ -75,6 +75,7 @@ def accumulate(  # noqa: PLR0915
     hessian: Points,
     gradient: Vector,
     tally: Vector,
+    rows_of_jacobian: Points,
     polynomial: Points,
 ) -> None:
     """Sum the normal equations of all matched points.
@@ -82,13 +83,15 @@ def accumulate(  # noqa: PLR0915
     A point goes on from its foot point of the last step; a new one from its neighbour's, and the
     index is asked only where that curve is not plainly the right one.
 
-    tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
+    rows_of_jacobian : (n, 5) how the residual of each point moves with x, y and theta, its weight,
+    and the variance of the normal of its curve. tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
     information that noisy tangents feign along a straight wall.
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
     inliers = squares = lever = total = feigned = 0.0
     f = residual = ux = uy = 0.0
+    noise = TANGENT_NOISE / (knot_step_m * knot_step_m)
     neighbour: Any = np.int64(-1)  # -1 as a literal would be compiled for itself
     for j in range(len(points)):
         qx = cos * points[j, 0] - sin * points[j, 1]
@@ -118,6 +121,7 @@ def accumulate(  # noqa: PLR0915
                     found = found and abs(residual) <= gate_m
         neighbour = rows[j] = row if found else -1
         if not found:
+            rows_of_jacobian[j, 3] = 0.0
             continue
         places[j] = f
         ratio = residual / kernel_m
@@ -135,7 +139,10 @@ def accumulate(  # noqa: PLR0915
         g2 -= weight * j2 * residual
         lever += weight * (qx * qx + qy * qy)
         total += weight
-        feigned += weight * TANGENT_NOISE * variances[j] / max(level.weights[row + 1], 0.1)
+        tilt = noise * variances[j] / max(level.weights[row + 1], 0.1)
+        feigned += weight * tilt
+        rows_of_jacobian[j, 0], rows_of_jacobian[j, 1], rows_of_jacobian[j, 2] = -uy, ux, j2
+        rows_of_jacobian[j, 3], rows_of_jacobian[j, 4] = weight, tilt
         if abs(residual) <= inlier_m:
             inliers += 1.0
             squares += residual * residual
@@ -144,4 +151,4 @@ def accumulate(  # noqa: PLR0915
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = h02, h12, h22
     gradient[0], gradient[1], gradient[2] = g0, g1, g2
     tally[0], tally[1], tally[2], tally[3] = inliers, squares, lever, total
-    tally[4] = feigned / (knot_step_m * knot_step_m)
+    tally[4] = feigned

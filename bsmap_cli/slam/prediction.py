@@ -80,6 +80,7 @@ class Predictor:
         self._odometry: SE2 | None = None
         self.last_step = SE2.identity()
         self._cruise_m = (0.0, 0.0)
+        self._vague_m = 0.0
         self._steps = -1  # the first pose is no step
         self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
         self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
@@ -99,14 +100,20 @@ class Predictor:
             )
         square_s2 = min(elapsed_s, LONGEST_S) ** 2
         started_rad = math.radians(settings.acceleration_deg_s2) * square_s2
-        sigma_m = max(
-            settings.motion_margin * self._spread_m, settings.acceleration_m_s2 * square_s2
-        )
+        started_m = settings.acceleration_m_s2 * square_s2
+        sigma_m = max(settings.motion_margin * self._spread_m, math.hypot(started_m, self._vague_m))
         sigma_rad = max(settings.motion_margin * self._spread_rad, started_rad)
         return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, False)
 
-    def observe(self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool) -> None:
-        """Tell what the step turned out to be, and whether the walls said so in all directions."""
+    def observe(
+        self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool, sigma_m: float = 0.0
+    ) -> None:
+        """Tell what the step turned out to be, and whether the walls said so in all directions.
+
+        sigma_m : how well the walls told its worst direction. A velocity taken from two such poses
+        is no better, and a robot that brakes must not be carried past the little that holds it.
+        """
+        self._vague_m = math.sqrt(2.0) * sigma_m if measured else 0.0
         if measured:
             surprise = step.relative_to(self.last_step)
             settings = self.settings

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.kernels import solve3
@@ -23,7 +24,7 @@ from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
 from bsmap_cli.slam.point_equations import accumulate
 
-SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
+SHARED = 10.0  # neighbours in a cluster err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; the next would be its square
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
@@ -79,6 +80,13 @@ class RegistrationResult(NamedTuple):
     degenerate: int
     points: int
 
+    @property
+    def worst_sigma_m(self) -> float:
+        """Deviation of the position in the direction that the data tell least of."""
+        (xx, xy, _), (_, yy, _), _ = self.information.tolist()
+        least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+        return 1.0 / math.sqrt(max(least, 1e-12))
+
 
 @kernel
 def _register(
@@ -88,6 +96,7 @@ def _register(
     points: Points,
     tangents: Points,
     counts: Vector,
+    starts: NDArray[np.int64],
     sigma_m: float,
     pose: Vector,
     prior_pose: Vector,
@@ -102,9 +111,12 @@ def _register(
 ) -> tuple[int, int]:
     """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
-    for j in range(len(points)):
-        variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
+    for c in range(len(starts) - 1):
+        alike = min(SHARED, float(starts[c + 1] - starts[c]))
+        for j in range(starts[c], starts[c + 1]):
+            variances[j] = alike * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
     gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
+    jacobian = np.empty((len(points), 5))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
     start = pose.copy()
     found = 0
@@ -126,6 +138,7 @@ def _register(
             hessian,
             gradient,
             tally,
+            jacobian,
             polynomial,
         )
         steps += 1
@@ -141,7 +154,7 @@ def _register(
         for i in range(3):
             wanted[i] = start[i] - pose[i]
         lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
-        found = keep_unobserved(hessian, lever, degenerate * tally[4], wanted, delta)
+        found = keep_unobserved(hessian, jacobian, lever, degenerate * tally[4], wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
         moved = math.hypot(delta[0], delta[1]) + lever * abs(delta[2])
@@ -178,6 +191,7 @@ def register(
         clusters.points,
         clusters.tangents,
         clusters.counts,
+        clusters.starts,
         sigma_m,
         pose,
         prior_pose,
