@@ -8,7 +8,6 @@ from bsmap_cli.geometry.compiled import inlined, part
 from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
-
 SURE = 3.0  # deviations of a normal's noise; what a point tells beyond them is no noise
 ENOUGH = 0.1  # of what noise feigns: so much that is no noise shows a direction
 

@@ -84,8 +84,9 @@ def accumulate(  # noqa: PLR0915
     index is asked only where that curve is not plainly the right one.
 
     rows_of_jacobian : (n, 5) how the residual of each point moves with x, y and theta, its weight,
-    and the variance of the normal of its curve. tally : inliers, sum of their squares, of weighted squared levers, of weights, and of the
-    information that noisy tangents feign along a straight wall.
+    and the variance of the normal of its curve. tally : inliers, sum of their squares, of weighted
+    squared levers, of weights, and of the information that noisy tangents feign along a straight
+    wall.
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
