@@ -20,7 +20,7 @@ def _certain(jacobian: Points, x: float, y: float, turn: float) -> float:
         weight = jacobian[j, 3]
         if weight > 0.0:
             along = jacobian[j, 0] * x + jacobian[j, 1] * y + jacobian[j, 2] * turn
-            total += weight * max(0.0, along * along - SURE * SURE * jacobian[j, 4])
+            total += weight * max(0.0, along * along - max(0.25, SURE * SURE * jacobian[j, 4]))
     return total
 
 
