@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.least_surface import LeastSurface, is_surface
 
 BEAM_GAPS = 3.0  # neighbours on one surface, seen under 70 degrees from its normal, in beam steps
 NOISE_GAPS = 4.0  # the relative test of eq. (3) counts smaller gaps as this many sigma
@@ -207,14 +208,13 @@ def cut_surfaces(
     ranges: Vector,
     beams: Integers,
     rule: GapRule,
-    min_length_m: float,
+    least: LeastSurface,
     kept: Points,
     bounds: Integers,
 ) -> int:
     """Write the returns on surfaces to `kept`, first and end of each surface to `bounds`.
 
-    Surfaces of fewer returns than the rule asks for, or shorter than `min_length_m`, are left
-    out. The number of surfaces.
+    Surfaces of which less is seen than `least` are left out. The number of surfaces.
     """
     count = len(ranges)
     longest = _longest_loss(points, ranges, beams, rule) if rule.beam_gap_rad > 0.0 else 0
@@ -236,7 +236,7 @@ def cut_surfaces(
             length += gap
             spacing = gap / (beams[found] - beams[last])
         else:
-            if end - start >= rule.fewest and length >= min_length_m:
+            if is_surface(end - start, length, least):
                 bounds[surfaces, 0], bounds[surfaces, 1] = start, end
                 surfaces += 1
                 start = end

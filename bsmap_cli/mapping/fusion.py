@@ -17,6 +17,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import match_points
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
 from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain, spacing_weights
+from bsmap_cli.mapping.least_surface import LeastSurface
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.mapping_settings import MappingSettings
@@ -73,6 +74,7 @@ def _fuse_piece(
         np.empty((curve_map.degree + 1, 2)),
     )
     runs = np.empty((2 * n + 2, 5), np.int64)
+    least_m = settings.segmentation.min_length * step
     count = plan_runs(
         curve_map.arrays,
         points,
@@ -80,8 +82,7 @@ def _fuse_piece(
         curves,
         u,
         step,
-        settings.segmentation.min_length * step,
-        2,
+        LeastSurface(2, least_m, 2, least_m),
         runs,
     )
     for run in runs[:count]:

@@ -11,6 +11,7 @@ from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import match_points
 from bsmap_cli.mapping.curve_map import CurveMap
+from bsmap_cli.mapping.least_surface import LeastSurface
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.run_merging import merge_runs
@@ -35,8 +36,7 @@ def _place_and_plan(
     starts: NDArray[np.int64],
     pose: Vector,
     gate_m: float,
-    min_length_m: float,
-    min_points: int,
+    least: LeastSurface,
     points: Points,
     tangents: Points,
     curves: NDArray[np.int64],
@@ -54,7 +54,7 @@ def _place_and_plan(
     match_points(
         level, matrix, knot_step_m, points, tangents, starts, gate_m, curves, u, polynomial
     )
-    return plan_runs(level, points, starts, curves, u, knot_step_m, min_length_m, min_points, runs)
+    return plan_runs(level, points, starts, curves, u, knot_step_m, least, runs)
 
 
 def insert_clusters(
@@ -84,8 +84,7 @@ def insert_clusters(
         clusters.starts,
         pose_map_body,
         settings.association.track_dist * step,
-        settings.segmentation.min_length * step,
-        settings.segmentation.min_points,
+        settings.segmentation.least(step),
         points,
         tangents,
         curves,

@@ -26,7 +26,7 @@ class Mapper:
     """Builds one map a knot step from scans with known poses."""
 
     def __init__(self, settings: MappingSettings) -> None:
-        self.settings = settings
+        self.settings = settings.without_faint()  # the poses are known: nothing to guide
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self.noise = RangeNoise(settings.sensor, settings.ladder[-1])
         self._views: list[View] = []

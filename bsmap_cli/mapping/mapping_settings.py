@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 from bsmap_cli.mapping.alignment import AlignmentSettings
 from bsmap_cli.mapping.association import AssociationSettings
@@ -26,3 +27,8 @@ class MappingSettings:
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     merging: MergingSettings = field(default_factory=MergingSettings)
     visibility: VisibilitySettings = field(default_factory=VisibilitySettings)
+
+    def without_faint(self) -> Self:
+        """The same, without the clusters that only guide."""
+        size = self.segmentation.min_points
+        return replace(self, segmentation=replace(self.segmentation, faint_points=size))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean, lean_part
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.least_surface import LeastSurface, is_surface
 from bsmap_cli.mapping.level_arrays import LevelArrays
 
 END_REACH = 3.0  # a run that comes this close to a curve's end may extend it [knot steps]
@@ -86,8 +87,7 @@ def plan_runs(
     curves: NDArray[np.int64],
     u: Vector,
     knot_step_m: float,
-    min_length_m: float,
-    min_points: int,
+    least: LeastSurface,
     runs: NDArray[np.int64],
 ) -> int:
     """Write the runs of all clusters; their number. See the column names above."""
@@ -117,10 +117,7 @@ def plan_runs(
                     runs[before, END] = stop
                 elif after >= 0:
                     runs[after, BEGIN] = cursor
-                elif (
-                    stop - cursor >= min_points
-                    and _stretch_length(points, cursor, stop) >= min_length_m
-                ):
+                elif is_surface(stop - cursor, _stretch_length(points, cursor, stop), least):
                     runs[count, CURVE] = -1
                     runs[count, BEGIN] = cursor
                     runs[count, END] = stop

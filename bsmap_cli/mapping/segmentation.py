@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.continuity import BEAM_GAPS, GapRule, cut_surfaces
+from bsmap_cli.mapping.least_surface import LeastSurface
 from bsmap_cli.sensor.gate import Returns
 from bsmap_cli.settings import setting
 
@@ -32,6 +33,7 @@ class SegmentationSettings:
     faint_points: int = setting(
         3, "SLAM is guided by smaller clusters too, down to this size, and draws none", minimum=2
     )
+    faint_length: float = setting(2.0, "but these must be longer [knot steps]", minimum=0.0)
     min_length: float = setting(0.75, "shorter clusters are dropped [knot steps]", minimum=0.0)
     beam_gap: bool = setting(
         True,
@@ -41,6 +43,15 @@ class SegmentationSettings:
     each_level: bool = setting(
         False, "segment anew for each knot step; off: once at the finest, and widen the bins"
     )
+
+    def least(self, knot_step_m: float) -> LeastSurface:
+        """What counts as a surface at one knot step."""
+        return LeastSurface(
+            self.min_points,
+            self.min_length * knot_step_m,
+            min(self.faint_points, self.min_points),
+            self.faint_length * knot_step_m,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +70,10 @@ class Clusters:
     def __len__(self) -> int:
         return len(self.starts) - 1
 
-    def drawn(self, min_points: int) -> Clusters:
+    def of_returns(self, fewest: int) -> Clusters:
         """Without the clusters of fewer raw returns."""
         returns = np.add.reduceat(self.counts, self.starts[:-1]) if len(self) else np.zeros(0)
-        kept = returns >= min_points
+        kept = returns >= fewest
         if kept.all():
             return self
         sizes = np.diff(self.starts)
@@ -169,7 +180,7 @@ def find_clusters(
         returns.ranges_m,
         returns.beams if spaced else np.arange(m),
         rule,
-        settings.min_length * knot_step_m,
+        settings.least(knot_step_m),
         kept,
         bounds,
     )

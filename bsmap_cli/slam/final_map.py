@@ -57,14 +57,14 @@ def build_map(
 ) -> list[CurveMap]:
     """Algorithm 1 over all keyframes; one map for each knot step of `ladder`.
 
-    Clusters below `segmentation.min_points` are left out. old : the levels, as many, that the
+    old : the levels, as many, that the
     keyframes go on with; empty: they begin with nothing.
     """
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
     for pose, keyframe in zip(poses, keyframes, strict=True):
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
-        drawn = finest.drawn(settings.segmentation.min_points)
+        drawn = finest.of_returns(settings.segmentation.faint_points)
         clusters = ScanLevels(drawn, ladder, settings.fitting, sigma_m)
         for level, seen in zip(levels, clusters, strict=True):
             insert_clusters(level, seen, pose, settings)
@@ -109,15 +109,15 @@ def final_map(
 
     old : a map that is gone on with, in the frame of the poses: a level for each knot step.
     """
-    guided = settings.while_tracking()
     for turn in range(settings.final_map.rounds):
         # once all poses agree with one map, none needs to be drawn in from farther off
         ladder = settings.ladder[-(settings.final_map.levels if turn == 0 else 1) :]
-        levels = build_map(poses, keyframes, ladder, guided, sigma_m, old[-len(ladder) :])
+        levels = build_map(poses, keyframes, ladder, settings, sigma_m, old[-len(ladder) :])
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
     before = old[-len(written) :]
-    levels = build_map(poses, keyframes, written, settings, sigma_m, before)
+    drawn = settings.without_faint()
+    levels = build_map(poses, keyframes, written, drawn, sigma_m, before)
     old_curves = [len(level) for level in before] or [0] * len(levels)
     remove_contradicted(levels, keyframes, poses, settings, sigma_m, old_curves=old_curves)
     for level in levels:

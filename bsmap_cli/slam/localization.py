@@ -64,7 +64,7 @@ class Localizer:
     """
 
     def __init__(self, document: MapDocument, settings: SlamSettings) -> None:
-        self.settings = settings_for_map(settings, document)
+        self.settings = settings_for_map(settings.without_faint(), document)
         self._map = KnownMap(document, self.settings)
         self._front = FrontEnd(self.settings)
         self._stamps_ns, self._poses = array("q"), array("d")

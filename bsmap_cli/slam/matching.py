@@ -64,7 +64,7 @@ def match_scan(
     fair = result.inlier_ratio >= recovery.search_below
     adrift = result.degenerate > 0 and not prediction.by_odometry
     unexplained = (1.0 - result.inlier_ratio) * result.points
-    astray = adrift and unexplained >= settings.segmentation.min_points
+    astray = adrift and unexplained >= settings.segmentation.faint_points
     if (fair and not gap and not astray) or result.points < FEWEST_POINTS:
         return result
     wider = min(blind, recovery.widest) if gap else 1.0

@@ -63,7 +63,6 @@ class Slam:
 
     def __init__(self, settings: SlamSettings, known: KnownMap | None = None) -> None:
         self.settings = settings
-        self._tracking = settings.while_tracking()
         self._known = known
         self._log = ScanLog()
         self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
@@ -84,11 +83,11 @@ class Slam:
 
     def process(self, scan: Scan) -> None:
         """Track one scan, insert it if it is a keyframe, and look for loops."""
-        settings = self._tracking
+        settings = self.settings
         started = time.perf_counter()
         sigma_m = self._noise.observe(scan)
         if self._local is None or self._closer is None:
-            self._local = LocalSlam(self._tracking, sigma_m)
+            self._local = LocalSlam(settings, sigma_m)
             self._closer = LoopCloser(self._local, SubmapGraph(self._local))
         self._local.sigma_m = sigma_m
         local = self._local

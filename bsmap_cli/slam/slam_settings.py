@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.slam.final_map import FinalMapSettings
@@ -25,11 +25,3 @@ class SlamSettings(MappingSettings):
     submaps: SubmapSettings = field(default_factory=SubmapSettings)
     loops: LoopSettings = field(default_factory=LoopSettings)
     final_map: FinalMapSettings = field(default_factory=FinalMapSettings)
-
-    def while_tracking(self) -> SlamSettings:
-        """The same, with clusters that guide and are not drawn.
-
-        Far down a corridor two or three beams on an end wall may be all that tells the way along.
-        """
-        faint = min(self.segmentation.faint_points, self.segmentation.min_points)
-        return replace(self, segmentation=replace(self.segmentation, min_points=faint))
