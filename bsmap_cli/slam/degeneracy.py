@@ -9,7 +9,6 @@ from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
 SURE = 3.0  # deviations of a normal's noise; what a point tells beyond them is no noise
-ENOUGH = 0.1  # of what noise feigns: so much that is no noise shows a direction
 
 
 @inlined
@@ -26,7 +25,13 @@ def _certain(jacobian: Points, x: float, y: float, turn: float) -> float:
 
 @part
 def keep_unobserved(
-    hessian: Points, jacobian: Points, lever_m: float, least: float, wanted: Vector, delta: Vector
+    hessian: Points,
+    jacobian: Points,
+    lever_m: float,
+    least: float,
+    certain: float,
+    wanted: Vector,
+    delta: Vector,
 ) -> int:
     """Replace the part of `delta` along unobserved directions by that of `wanted`; their number.
 
@@ -34,7 +39,8 @@ def keep_unobserved(
 
     Directions are judged with angles scaled by the lever arm, so that metres compare with metres,
     and without the prior, which must not make a corridor look observed. What the noise feigned
-    there is taken out of `hessian`.
+    there is taken out of `hessian`. A direction is observed with information above `least`, or with
+    `certain` of such that no noise explains.
     """
     scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
     lever = max(lever_m, 1e-9)
@@ -47,7 +53,7 @@ def keep_unobserved(
         if values[k] > least:
             continue
         x, y, turn = vectors[0, k], vectors[1, k], vectors[2, k] / lever
-        if _certain(jacobian, x, y, turn) > ENOUGH * least:
+        if _certain(jacobian, x, y, turn) > certain:
             continue
         found += 1
         missing = 0.0

@@ -166,7 +166,7 @@ class LoopCloser:
             guess,
             isotropic_information(deviation),
             sigma_m=self.local.sigma_m,
-            settings=settings.registration,
+            settings=settings.registration.far_off(),
         )
         if not self._good(result, unit):
             return

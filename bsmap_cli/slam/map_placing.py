@@ -196,7 +196,7 @@ class MapPlacer:
                 start,
                 isotropic_information((5.0 * self._unit, 0.5)),
                 sigma_m=0.0,
-                settings=self._settings.registration,
+                settings=self._settings.registration.far_off(),
             )
             pose = SE2.from_array(result.pose)
         found = self._judged(pose)

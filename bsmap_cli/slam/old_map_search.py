@@ -135,7 +135,7 @@ class PlaceFinder:
             start,
             isotropic_information((0.5 * DIRECT_STEPS * self._unit, 0.1)),
             sigma_m=sigma_m,
-            settings=settings.registration,
+            settings=settings.registration.far_off(),
         )
 
     def fits(self, result: RegistrationResult) -> bool:

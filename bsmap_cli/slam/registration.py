@@ -8,7 +8,7 @@ along the map curve's normal (point-to-curve Gauss-Newton).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +61,16 @@ class RegistrationSettings:
         "the curves' tangents alone would feign",
         minimum=0.0,
     )
+    certain: float = setting(
+        0.1,
+        "while tracking it is observed, too, when points that no such noise explains give it so "
+        "many times that",
+        minimum=0.0,
+    )
+
+    def far_off(self) -> RegistrationSettings:
+        """For a place that was searched for: a few points may be of another place like it."""
+        return replace(self, certain=math.inf)
 
 
 class RegistrationResult(NamedTuple):
@@ -106,13 +116,14 @@ def _register(
     inlier_m: float,
     iterations: int,
     degenerate: float,
+    certain: float,
     hessian: Points,
     tally: Vector,
 ) -> tuple[int, int]:
     """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
     for c in range(len(starts) - 1):
-        alike = min(SHARED, float(starts[c + 1] - starts[c]))
+        alike = SHARED
         for j in range(starts[c], starts[c + 1]):
             variances[j] = alike * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
     gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
@@ -154,7 +165,8 @@ def _register(
         for i in range(3):
             wanted[i] = start[i] - pose[i]
         lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
-        found = keep_unobserved(hessian, jacobian, lever, degenerate * tally[4], wanted, delta)
+        least = degenerate * tally[4]
+        found = keep_unobserved(hessian, jacobian, lever, least, certain * least, wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
         moved = math.hypot(delta[0], delta[1]) + lever * abs(delta[2])
@@ -201,6 +213,7 @@ def register(
         max(settings.inlier * step, 3.0 * sigma_m),
         iterations or settings.iterations,
         settings.degenerate,
+        settings.certain,
         hessian,
         tally,
     )
