@@ -14,6 +14,7 @@ from bsmap_cli.settings import setting
 MEMORY = 0.05  # share of the newest surprise
 CRUISE = 0.25  # share of the newest step in the velocity that is kept where walls say nothing
 LONGEST_S = 0.5  # no robot gathers speed for longer
+FOLLOWING = 0.6  # of a match's deviation is in the step to it: two in a row err alike
 ODOMETRY_DRIFT = 0.1  # of the way: what raw odometry slips at its worst
 
 
@@ -110,10 +111,10 @@ class Predictor:
     ) -> None:
         """Tell what the step turned out to be, and whether the walls said so in all directions.
 
-        sigma_m : how well the walls told its worst direction. A velocity taken from two such poses
-        is no better, and a robot that brakes must not be carried past the little that holds it.
+        sigma_m : how well the walls told its worst direction. A velocity taken from such poses is
+        hardly better, and a robot that brakes must not be carried past the little that holds it.
         """
-        self._vague_m = math.sqrt(2.0) * sigma_m if measured else 0.0
+        self._vague_m = FOLLOWING * sigma_m if measured else 0.0
         if measured:
             surprise = step.relative_to(self.last_step)
             settings = self.settings
