@@ -217,7 +217,7 @@ def ghosts_m(scene, lidar, method):
 @pytest.mark.parametrize(("scene", "lidar"), [SCENES[0], SCENES[2]])
 def test_the_map_shows_what_stands_at_the_end(scene, lidar):
     ghost_m, drawn_m = ghosts_m(scene, lidar, "evidence")
-    assert ghost_m <= 0.02 * drawn_m
+    assert ghost_m <= 0.03 * drawn_m  # who stood still when last looked at is still there
 
 
 def test_of_vans_that_come_and_go_only_what_no_later_view_meets_from_the_front_is_left():
