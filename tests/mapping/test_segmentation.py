@@ -149,3 +149,39 @@ def by_eq_3(ranges, rule):
             clusters.append([point])
             before = math.inf
     return np.array([point for cluster in clusters if len(cluster) > 1 for point in cluster])
+
+
+def far_wall(beams, range_m):
+    """Returns of some beams, half a degree apart, on a wall straight ahead; else none."""
+    ranges = np.full(len(BEAMS), np.inf)
+    middle = len(BEAMS) // 2
+    for k in range(beams):
+        beam = middle + k
+        ranges[beam] = range_m / math.cos(BEAMS[beam])
+    return ranges
+
+
+def test_three_beams_far_away_are_a_faint_surface_and_near_by_none():
+    faint = clusters_of(far_wall(3, 15.0))  # 13 cm from beam to beam
+    assert len(faint) == 1
+    assert faint.points == pytest.approx(
+        faint.points[0] + [[0, 0], [0, 0.131], [0, 0.262]], abs=2e-3
+    )
+    assert len(clusters_of(far_wall(2, 15.0))) == 0
+    assert len(clusters_of(far_wall(3, 3.0))) == 0
+    plain = dataclasses.replace(DEFAULT, faint_points=DEFAULT.min_points)
+    assert len(clusters_of(far_wall(3, 15.0), plain)) == 0
+    assert len(clusters_of(far_wall(5, 15.0), plain)) == 1
+
+
+def test_only_clusters_of_enough_returns_are_kept():
+    ranges = np.minimum(far_wall(3, 15.0), np.roll(far_wall(20, 2.0), 60))
+    both = clusters_of(ranges)
+    assert len(both) == 2
+    kept = both.of_returns(5)
+    assert len(kept) == 1
+    assert np.hypot(*kept.points.T).max() < 3.0
+    assert kept.counts.sum() == both.counts.sum() - 3
+    assert kept.starts.tolist() == [0, len(kept.points)]
+    assert both.of_returns(3) is both
+    assert len(both.of_returns(100)) == 0

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.slam.registration import RegistrationSettings, register
+from tests.mapping.walls import insert, line
 from tests.slam.rooms import (
     CENTRE,
     LOOSE,
@@ -34,7 +35,7 @@ def run(curve_map, clusters, start, prior=None, information=LOOSE, **rest):
         start if prior is None else np.asarray(prior, float),
         information,
         sigma_m=rest.pop("sigma_m", 0.005),
-        settings=RegistrationSettings(),
+        settings=rest.pop("settings", RegistrationSettings()),
         **rest,
     )
 
@@ -159,3 +160,50 @@ def test_scattered_clutter_does_not_move_the_pose(seed):
     clusters = seen_from(CENTRE, parts, sigma_m=0.01)
     result = run(ROOM, clusters, np.add(CENTRE.as_array(), (0.02, -0.02, 0.003)), sigma_m=0.01)
     assert result.pose == pytest.approx(CENTRE.as_array(), abs=0.004)
+
+
+END = line((4.0, 0.3), (4.0, 1.7), 0.02)
+MIDDLE = SE2(0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.01])
+@pytest.mark.parametrize("seed", range(4))
+def test_three_points_on_an_end_wall_tell_the_way_along_a_corridor(seed, noise_m):
+    """Few as they are, they stand across the way, as no noise of the other walls would."""
+    random = np.random.default_rng(seed)
+
+    def noisy(parts):
+        return [part + random.normal(0.0, noise_m, part.shape) for part in parts]
+
+    curve_map = map_of(noisy([*corridor_parts(), END]), times=1)
+    for _ in range(9):
+        insert(curve_map, *noisy([*corridor_parts(), END]))
+    sides = [part[100:300] for part in corridor_parts()]
+    sigma_m = max(noise_m, 0.005)
+    told = seen_from(MIDDLE, noisy([*sides, END[15:60:15]]), sigma_m=sigma_m)
+    start = (0.03, 1.01, 0.001)
+    result = run(curve_map, told, start, sigma_m=sigma_m)
+    assert result.degenerate == 0
+    assert result.pose[0] == pytest.approx(0.0, abs=0.002 + 2.0 * noise_m)
+    assert run(curve_map, seen_from(MIDDLE, sides), start, sigma_m=sigma_m).degenerate == 1
+
+
+def test_a_place_that_was_searched_for_needs_more_than_three_points():
+    curve_map = map_of([*corridor_parts(), END], times=1)
+    told = seen_from(MIDDLE, [*(part[100:300] for part in corridor_parts()), END[15:60:15]])
+    start = (0.03, 1.01, 0.001)
+    assert run(curve_map, told, start).degenerate == 0
+    found = run(curve_map, told, start, settings=RegistrationSettings().far_off())
+    assert found.degenerate == 1
+    assert found.pose[0] == pytest.approx(0.03, abs=1e-3)
+
+
+def test_the_worst_direction_of_a_match_is_that_along_the_corridor():
+    sides = [*(part[100:300] for part in corridor_parts()), END]
+    curve_map = map_of([*corridor_parts(), END])
+    turned = SE2(0.0, 0.0, 0.7)
+    result = run(curve_map, seen_from(MIDDLE, sides), MIDDLE.as_array())
+    there = run(curve_map.moved(turned), seen_from(MIDDLE, sides), (turned @ MIDDLE).as_array())
+    least = np.linalg.eigvalsh(result.information[:2, :2])[0]
+    assert result.worst_sigma_m == pytest.approx(least**-0.5, rel=1e-6)
+    assert there.worst_sigma_m == pytest.approx(result.worst_sigma_m, rel=0.01)
