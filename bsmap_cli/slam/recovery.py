@@ -11,12 +11,14 @@ import numpy as np
 from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
-from bsmap_cli.slam.correlative import Window, search
+from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings
 from bsmap_cli.slam.submap import Submap
+from bsmap_cli.slam.wide_search import search
 
 HEIGHTS = 4  # of the likelihood pyramid: blocks of 8 cells at the top
+LEAST_SCORE = 0.2  # of a place worth refining
 CELL_STEPS = 1.0  # cell of the likelihood [finest knot steps]
 
 
@@ -77,10 +79,14 @@ def recover(
     cell_m = CELL_STEPS * submap.levels[-1].knot_step_m
     likelihood = submap.likelihood(cell_m=cell_m, heights=HEIGHTS)
     coarse = clusters[max(0, len(clusters) - 2)]
+    here = search(
+        likelihood, coarse.points, coarse.tangents, Window(best.pose, 0.0, 0.0), floor=0.0
+    )
+    floor = max(LEAST_SCORE, here.score if here else 0.0)  # what scores less will not fit better
     wary = (surely or believed is not None) and best.inlier_ratio >= recovery.lost_below
     for pose, reach_m in guesses:
         window = Window(pose, reach_m, reach_rad)
-        peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.2)
+        peak = search(likelihood, coarse.points, coarse.tangents, window, floor=floor)
         if peak is None:
             continue
         loose = prior_information * 1e-4
