@@ -60,7 +60,8 @@ def draw_grid(level: MapLevel, pieces: DrawnPieces) -> DrawnGrid:
         ),
         axis=1,
     )
-    control = np.ascontiguousarray(level.control_points)
+    control = np.require(level.control_points, np.float32, ["C", "A"]).view()
+    control.flags.writeable = False  # as in a map that was read: one type to compile for
     # a span lies within the box of its control points
     low, high = np.zeros(2), np.full(2, level.knot_step_m)
     if len(control):
