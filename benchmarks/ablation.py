@@ -33,7 +33,6 @@ CHANGES: dict[str, tuple[str, ...]] = {
     "no test for unobserved directions": ("registration.degenerate=0",),
     "curves to curves on the coarsest level": ("registration.method=joint_first",),
     "no thinning": ("fitting.thinning=0",),
-    "chord length instead of arc length": ("fitting.parameters=chord",),
     "merging by Table I": ("merging.method=table",),
     "every scan a keyframe": ("keyframes.distance=0",),
     "no recovery": ("recovery.search_below=0", "recovery.lost_below=0"),
