@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.kernels import solve3
@@ -24,7 +23,7 @@ from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
 from bsmap_cli.slam.point_equations import accumulate
 
-SHARED = 10.0  # neighbours in a cluster err alike: so many count as one against the prior
+SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; the next would be its square
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
@@ -106,7 +105,6 @@ def _register(
     points: Points,
     tangents: Points,
     counts: Vector,
-    starts: NDArray[np.int64],
     sigma_m: float,
     pose: Vector,
     prior_pose: Vector,
@@ -122,10 +120,8 @@ def _register(
 ) -> tuple[int, int]:
     """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
-    for c in range(len(starts) - 1):
-        alike = SHARED
-        for j in range(starts[c], starts[c + 1]):
-            variances[j] = alike * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
+    for j in range(len(points)):
+        variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
     gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
     jacobian = np.empty((len(points), 5))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
@@ -203,7 +199,6 @@ def register(
         clusters.points,
         clusters.tangents,
         clusters.counts,
-        clusters.starts,
         sigma_m,
         pose,
         prior_pose,
