@@ -14,6 +14,7 @@ from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.trimming import remove_guessed
 from bsmap_cli.sensor.gate import Returns, find_returns
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
@@ -88,6 +89,7 @@ class Mapper:
                 )
         if self.settings.association.method == "curve":
             for level in self.levels:
+                remove_guessed(level, min_length=self.settings.segmentation.min_length)
                 tidy(level, min_length=self.settings.segmentation.min_length)
         cap = self.settings.merging.max_weight
         return MapDocument(

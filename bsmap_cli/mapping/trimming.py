@@ -6,6 +6,8 @@ is shorter, or falls into several curves; what keeps its lattice indices keeps i
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +32,23 @@ def remove_points(curve_map: CurveMap, gone: Rows, *, min_length: float) -> None
         end = begin + int(arrays.count[curve])
         if gone[begin:end].any():
             _divide(curve_map, curve, _remaining(gone, begin, end), min_length)
+
+
+def remove_guessed(curve_map: CurveMap, *, min_length: float) -> None:
+    """Cut curves where they only pass from one measured stretch to another.
+
+    Beams that may have been lost, or a door seen at a grazing angle, leave a curve that crosses an
+    opening. Where nothing else was measured on it, the control points there kept hardly any weight.
+    """
+    arrays, degree = curve_map.arrays, curve_map.degree
+    gone = np.zeros(int(arrays.sizes[1]), bool)
+    for curve in range(len(curve_map)):
+        begin = int(arrays.offset[curve])
+        spans = int(arrays.count[curve]) - degree
+        measured = np.flatnonzero(arrays.span_cell[begin : begin + spans] >= 0).tolist()
+        for before, behind in pairwise([-1, *measured, spans]):
+            gone[begin + before + degree + 1 : begin + behind] = True
+    remove_points(curve_map, gone, min_length=min_length)
 
 
 def _remaining(gone: Rows, begin: int, end: int) -> list[Run]:

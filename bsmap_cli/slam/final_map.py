@@ -13,6 +13,7 @@ from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.thaw import thaw_level
+from bsmap_cli.mapping.trimming import remove_guessed
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
 from bsmap_cli.slam.keyframes import Keyframe
@@ -123,5 +124,6 @@ def final_map(
     for level in levels:
         if len(keyframes) >= FEW_KEYFRAMES:
             drop_unconfirmed(level, settings.final_map.min_views)
+        remove_guessed(level, min_length=settings.segmentation.min_length)
         tidy(level, min_length=settings.segmentation.min_length)
     return poses, levels
