@@ -98,7 +98,14 @@ def _register(
 ) -> Vector:
     information = np.diag([off[0] ** -2.0] * 2 + [math.radians(off[1]) ** -2.0])
     result = track_down(
-        mapper.levels, clusters, start, start, information, sigma_m=NOISE_M, settings=settings
+        mapper.levels,
+        clusters,
+        start,
+        start,
+        information,
+        enough=settings.registration.shortcut,
+        sigma_m=NOISE_M,
+        settings=settings,
     )
     return result.pose
 

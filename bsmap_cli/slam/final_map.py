@@ -17,7 +17,7 @@ from bsmap_cli.mapping.trimming import remove_guessed
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
 from bsmap_cli.slam.keyframes import Keyframe
-from bsmap_cli.slam.near_registration import register_near
+from bsmap_cli.slam.ladder import register_near
 from bsmap_cli.slam.uncertainty import isotropic_information
 
 if TYPE_CHECKING:
@@ -90,7 +90,9 @@ def refine_poses(
             levels,
             clusters,
             poses[k],
+            poses[k],
             prior,
+            enough=settings.registration.shortcut,
             sigma_m=sigma_m,
             settings=settings.registration,
         )

@@ -35,6 +35,46 @@ def register_down(
     return result
 
 
+def register_near(
+    levels: Sequence[CurveMap],
+    clusters: Sequence[Clusters],
+    start_pose: Vector,
+    prior_pose: Vector,
+    prior_information: Points,
+    *,
+    enough: float,
+    sigma_m: float,
+    settings: RegistrationSettings,
+) -> RegistrationResult:
+    """From a pose that is nearly right: on the finest level, down the ladder where that fails.
+
+    enough : share of the points, 0 to 1, that must lie on the finest level to leave it at that.
+
+    Not for closures: what the finest level explains from a searched pose may be beside the place.
+    """
+    if len(levels) > 1:
+        finest = register(
+            levels[-1],
+            clusters[-1],
+            start_pose,
+            prior_pose,
+            prior_information,
+            sigma_m=sigma_m,
+            settings=settings,
+        )
+        if finest.inlier_ratio >= enough and not finest.degenerate:
+            return finest
+    return register_down(
+        levels,
+        clusters,
+        start_pose,
+        prior_pose,
+        prior_information,
+        sigma_m=sigma_m,
+        settings=settings,
+    )
+
+
 def track_down(
     levels: Sequence[CurveMap],
     clusters: Sequence[Clusters],
@@ -42,32 +82,29 @@ def track_down(
     prior_pose: Vector,
     prior_information: Points,
     *,
-    explained: float,
+    enough: float,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
     """Register the scan that follows the last one, by the method that is set.
 
-    Scans that follow each other closely begin within reach of the finest level, and most end
-    there. Of new ground less lies on the map, from any pose: what the last scan had on it,
-    `explained`, is the measure. Where curves are registered to curves, the points say in the end
-    how well the pose fits.
+    enough : as in `register_near`; scans that follow each other closely begin within reach of the
+    finest level, and most end there. Where curves are registered to curves, the points say in the
+    end how well the pose fits.
     """
     method = settings.registration.method
     if method == "points":
-        quick = register(
-            levels[-1],
-            clusters[-1],
+        return register_near(
+            levels,
+            clusters,
             start_pose,
             prior_pose,
             prior_information,
+            enough=enough,
             sigma_m=sigma_m,
             settings=settings.registration,
         )
-        enough = max(settings.registration.shortcut * explained, settings.recovery.search_below)
-        if quick.inlier_ratio >= enough and not quick.degenerate:
-            return quick
-    by_curves = {"points": 0, "joint_first": 1}.get(method, len(levels))
+    by_curves = 1 if method == "joint_first" else len(levels)
     pose = start_pose
     for level, seen in zip(levels[:by_curves], clusters[:by_curves], strict=True):
         pose = match_curves(

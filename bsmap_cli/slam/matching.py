@@ -49,17 +49,19 @@ def match_scan(
     """
     predicted = (last @ prediction.step).as_array()
     information = prediction.information()
+    recovery = settings.recovery
+    # of new ground less lies on the map, from any pose: what the last scan had on it is the measure
+    enough = max(settings.registration.shortcut * explained, recovery.search_below)
     result = track_down(
         submap.levels,
         clusters,
         predicted,
         predicted,
         information,
-        explained=explained,
+        enough=enough,
         sigma_m=sigma_m,
         settings=settings,
     )
-    recovery = settings.recovery
     gap = blind > recovery.gap
     fair = result.inlier_ratio >= recovery.search_below
     adrift = result.degenerate > 0 and not prediction.by_odometry

@@ -49,8 +49,8 @@ class RegistrationSettings:
     )
     shortcut: float = setting(
         0.9,
-        "so much of what the last scan had on the map must lie on the finest level, from the "
-        "prediction on, to leave the coarser levels out; 2: never",
+        "share that must lie on the finest level to leave the coarser ones out: while tracking, of "
+        "what the last scan had on the map; for the finished map, of the whole scan; 2: hardly ever",
         minimum=0.0,
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.slam import ladder
 from bsmap_cli.slam.registration import RegistrationSettings, register
 from tests.mapping.walls import insert, line
 from tests.slam.rooms import (
@@ -207,3 +208,28 @@ def test_the_worst_direction_of_a_match_is_that_along_the_corridor():
     least = np.linalg.eigvalsh(result.information[:2, :2])[0]
     assert result.worst_sigma_m == pytest.approx(least**-0.5, rel=1e-6)
     assert there.worst_sigma_m == pytest.approx(result.worst_sigma_m, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("levels", "enough", "asked"), [(1, 2.0, 1), (1, 0.5, 1), (3, 0.5, 1), (3, 2.0, 1 + 3)]
+)
+def test_near_the_place_the_finest_level_is_asked_first_and_a_lone_one_once(
+    levels, enough, asked, monkeypatch
+):
+    calls = []
+    monkeypatch.setattr(
+        ladder, "register", lambda *args, **rest: calls.append(args) or register(*args, **rest)
+    )
+    clusters, pose = seen_from(CENTRE, room_parts()), CENTRE.as_array()
+    result = ladder.register_near(
+        [ROOM] * levels,
+        [clusters] * levels,
+        pose,
+        pose,
+        LOOSE,
+        enough=enough,
+        sigma_m=0.005,
+        settings=RegistrationSettings(),
+    )
+    assert len(calls) == asked
+    assert result.inlier_ratio > 0.98
