@@ -31,9 +31,12 @@ class SegmentationSettings:
     )
     min_points: int = setting(5, "smaller clusters are not drawn", symbol="gamma_min", minimum=2)
     faint_points: int = setting(
-        3, "SLAM is guided by smaller clusters too, down to this size, and draws none", minimum=2
+        3,
+        "SLAM is guided by smaller clusters too, down to this size, and leaves them out of the "
+        "finished map; with final_map.rebuild=false they are drawn too",
+        minimum=2,
     )
-    faint_length: float = setting(2.0, "but these must be longer [knot steps]", minimum=0.0)
+    faint_length: float = setting(2.0, "these must be at least so long [knot steps]", minimum=0.0)
     min_length: float = setting(0.75, "shorter clusters are dropped [knot steps]", minimum=0.0)
     beam_gap: bool = setting(
         True,

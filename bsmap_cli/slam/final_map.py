@@ -58,8 +58,7 @@ def build_map(
 ) -> list[CurveMap]:
     """Algorithm 1 over all keyframes; one map for each knot step of `ladder`.
 
-    old : the levels, as many, that the
-    keyframes go on with; empty: they begin with nothing.
+    old : levels that the keyframes go on with, one for each knot step; empty: from nothing.
     """
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]

@@ -38,9 +38,9 @@ def match_scan(
     """Register the scan that follows the one at `last`, a pose in the submap's frame.
 
     blind : usual scan times that passed without odometry; in a gap the robot may have gone
-    anywhere near, and even a fair match may be of another place. explained : share of the last
-    scan's points that lay on the map. growing : the map ends where the
-    robot has been, and not where the walls do.
+    anywhere near, and even a fair match may be of another place.
+    explained : share of the last scan's points that lay on the map.
+    growing : the map ends where the robot has been, and not where the walls do.
 
     A corridor holds its few features out of reach as soon as the robot starts, stops or turns
     otherwise than predicted: what is left then looks bare, and the prediction is kept. Where

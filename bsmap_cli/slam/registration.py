@@ -50,7 +50,8 @@ class RegistrationSettings:
     shortcut: float = setting(
         0.9,
         "share that must lie on the finest level to leave the coarser ones out: while tracking, of "
-        "what the last scan had on the map; for the finished map, of the whole scan; 2: hardly ever",
+        "what the last scan had on the map; for the finished map, of the whole scan; 2: next to "
+        "never",
         minimum=0.0,
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
