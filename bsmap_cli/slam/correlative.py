@@ -7,7 +7,6 @@ each point anywhere in the block could not beat what is already found.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +17,6 @@ from bsmap_cli.slam.likelihood import Likelihood
 
 Integers = NDArray[np.int64]
 Places = NDArray[np.int32]
-
-
-@dataclass(frozen=True, slots=True)
-class Peak:
-    """A pose (3,) in the submap frame and its score in 0..1."""
-
-    pose: Vector
-    score: float
 
 
 @inlined
@@ -228,72 +219,26 @@ def _search(
     return score, angle, dx, dy
 
 
-@dataclass(frozen=True, slots=True)
-class Window:
-    """Where to look: `centre` (3,) in the submap frame, half widths [m], [rad] (pi: all round)."""
-
-    centre: Vector
-    reach_m: float
-    reach_rad: float
-
-
-def window_grid(
-    cell_m: float,
-    points: Points,
-    window: Window,
-    barred: Peak | None,
-    apart_m: float,
-    apart_rad: float,
-) -> tuple[Vector, Points, int]:
-    """The poses of a window: angles, what is barred at each (x, y, radius), reach; in cells.
-
-    The farthest point moves by a cell from one angle to the next.
-    """
-    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
-    turn = cell_m / max(radius, 4.0 * cell_m)
-    steps = math.ceil(min(window.reach_rad, math.pi) / turn)
-    offsets = np.arange(-steps, steps + 1)
-    # what lies near the guess is tried first: a good score spares much of the rest
-    angles = window.centre[2] + offsets[np.argsort(np.abs(offsets), kind="stable")] * turn
-    discs = np.zeros((len(angles), 3))
-    if barred is not None:
-        discs[:, :2] = (barred.pose[:2] - window.centre[:2]) / cell_m
-        turned = np.remainder(angles - barred.pose[2] + math.pi, math.tau) - math.pi
-        discs[np.abs(turned) < apart_rad, 2] = apart_m / cell_m
-    return angles, discs, math.ceil(window.reach_m / cell_m)
-
-
-def search(
+def search_angles(
     likelihood: Likelihood,
     points: Points,
     tangents: Points,
-    window: Window,
-    *,
+    centre: Vector,
+    angles: Vector,
+    barred: Points,
+    reach: int,
     floor: float,
-    barred: Peak | None = None,
-    apart_m: float = 1.0,
-    apart_rad: float = 0.17,
-) -> Peak | None:
-    """The best pose of a scan in a submap within a window, or None where none scores `floor`.
+) -> tuple[float, float, int, int]:
+    """Best score above `floor`, or -1, its angle and translation [cells]; each angle by itself.
 
-    Parameters
-    ----------
-    points, tangents : (n, 2) of the scan, body frame; thinned to the cells, they count alike.
-    barred : poses within `apart_m` and `apart_rad` of this peak do not count: what is then found
-        is a rival of it.
+    barred : dx, dy and radius [cells] of the disc that does not count at each angle.
     """
-    if len(points) == 0:
-        return None
-    cell_m, centre = likelihood.cell_m, window.centre
-    angles, discs, reach = window_grid(cell_m, points, window, barred, apart_m, apart_rad)
-    block = 1 << (len(likelihood.grids) - 1)
+    cell_m, block = likelihood.cell_m, 1 << (len(likelihood.grids) - 1)
     cells = np.empty((len(angles), len(points), 3), np.int64)
     places, safe = np.empty(cells.shape[:2], np.int32), np.empty(len(angles), np.int64)
     bounds = np.empty((len(angles), math.ceil((2 * reach + 1) / block) ** 2))
     grids, (x, y) = likelihood.grids, centre[:2] - likelihood.origin_m
     _bound(grids, points, tangents, angles, x, y, reach, cell_m, cells, places, safe, bounds)
     order = np.argsort(-bounds, axis=None, kind="stable")  # likely blocks first
-    score, angle, dx, dy = _search(grids, cells, places, safe, bounds, order, reach, floor, discs)
-    if score < 0.0:
-        return None
-    return Peak(np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[angle]]), score)
+    score, angle, dx, dy = _search(grids, cells, places, safe, bounds, order, reach, floor, barred)
+    return score, angles[angle], dx, dy

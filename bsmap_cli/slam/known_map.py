@@ -14,8 +14,8 @@ from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.resampling import one_level, resampled_level
 from bsmap_cli.mapping.thaw import thaw_level
-from bsmap_cli.slam.correlative import Peak, Window
 from bsmap_cli.slam.likelihood import Likelihood, build_likelihood, sample_surfaces
+from bsmap_cli.slam.search_window import Peak, Window
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.wide_search import search
 

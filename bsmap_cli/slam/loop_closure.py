@@ -12,12 +12,12 @@ from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
-from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.registration import RegistrationResult
+from bsmap_cli.slam.search_window import Window
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information

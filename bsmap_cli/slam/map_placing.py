@@ -21,11 +21,11 @@ from bsmap_cli.mapping.resampling import one_level
 from bsmap_cli.mapping.sampling import sample_level
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap, settings_for_map
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.recovery import CELL_STEPS
+from bsmap_cli.slam.search_window import Window
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.uncertainty import isotropic_information
 from bsmap_cli.slam.wide_search import search

@@ -11,7 +11,6 @@ from bsmap_cli.errors import TrackingError
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.visibility import HIT, MISS, look_at
-from bsmap_cli.slam.correlative import Peak, Window
 from bsmap_cli.slam.known_map import MOST_POINTS, KnownMap
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import sample_surfaces
@@ -20,6 +19,7 @@ from bsmap_cli.slam.loop_closure import DIRECT_STEPS, HEIGHTS
 from bsmap_cli.slam.matching import FEWEST_POINTS
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.registration import RegistrationResult
+from bsmap_cli.slam.search_window import Peak, Window
 from bsmap_cli.slam.uncertainty import isotropic_information
 from bsmap_cli.slam.wide_search import search
 

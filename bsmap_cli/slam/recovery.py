@@ -11,9 +11,9 @@ import numpy as np
 from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
-from bsmap_cli.slam.correlative import Window
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings
+from bsmap_cli.slam.search_window import Window
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.wide_search import search
 

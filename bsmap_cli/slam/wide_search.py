@@ -1,6 +1,6 @@
-"""The same search for wide windows: whole buildings, all round.
+"""Find a scan in a submap without a good guess, in windows up to whole buildings, all round.
 
-Where `correlative.search` asks every block of translations at every angle, here blocks span angles
+Few blocks of translations are asked at every angle, one by one. In wide windows blocks span angles
 as well: a block of height h holds 2^h translations each way and 2^h angles, in which no point
 moves by more than 2^h - 1 cells, so that windows of 2^(h+1) cells bound them all. Blocks of this
 kind are only as fine as 8 cells; from there on each angle is searched by itself.
@@ -14,10 +14,10 @@ import numpy as np
 
 from bsmap_cli.geometry.compiled import kernel, lean_part
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.slam import correlative
 from bsmap_cli.slam.block_bounds import FINEST, bound, coarse_levels
-from bsmap_cli.slam.correlative import Integers, Peak, Places, Window, descend, project
+from bsmap_cli.slam.correlative import Integers, Places, descend, project, search_angles
 from bsmap_cli.slam.likelihood import CHANNELS, Grid, Likelihood
+from bsmap_cli.slam.search_window import Peak, Window, window_grid
 
 SPREAD = 0.6180339887498949  # the golden section: every stretch of points is asked early on
 FEW_BLOCKS = 4096  # so many are asked one by one sooner than blocks of blocks are drawn
@@ -34,30 +34,42 @@ def search(
     apart_m: float = 1.0,
     apart_rad: float = 0.17,
 ) -> Peak | None:
-    """`correlative.search`: the same arguments, the same best pose."""
-    heights = len(likelihood.grids)
+    """The best pose of a scan in a submap within a window, or None where none scores `floor`.
+
+    Parameters
+    ----------
+    points, tangents : (n, 2) of the scan, body frame; thinned to the cells, they count alike.
+    barred : poses within `apart_m` and `apart_rad` of this peak do not count: what is then found
+        is a rival of it.
+    """
     if len(points) == 0:
         return None
-    angles, discs, reach = correlative.window_grid(
-        likelihood.cell_m, points, window, barred, apart_m, apart_rad
-    )
+    heights, cell_m, centre = len(likelihood.grids), likelihood.cell_m, window.centre
+    angles, discs, reach = window_grid(cell_m, points, window, barred, apart_m, apart_rad)
     block = 1 << (heights - 1)
     asked = len(angles) * ((2 * reach + block) // block) ** 2
-    if heights <= FINEST or asked <= FEW_BLOCKS:
-        return correlative.search(
-            likelihood,
-            points,
-            tangents,
-            window,
-            floor=floor,
-            barred=barred,
-            apart_m=apart_m,
-            apart_rad=apart_rad,
-        )
+    engine = search_angles if heights <= FINEST or asked <= FEW_BLOCKS else search_blocks
+    score, angle, dx, dy = engine(likelihood, points, tangents, centre, angles, discs, reach, floor)
+    if score < 0.0:
+        return None
+    return Peak(np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angle]), score)
+
+
+def search_blocks(
+    likelihood: Likelihood,
+    points: Points,
+    tangents: Points,
+    centre: Vector,
+    angles: Vector,
+    barred: Points,
+    reach: int,
+    floor: float,
+) -> tuple[float, float, int, int]:
+    """`search_angles`, in blocks of angles: the same arguments, the same best score."""
     order = np.argsort(angles, kind="stable")
-    angles, discs = angles[order], discs[order]
+    angles, barred = angles[order], barred[order]
     top = max(FINEST + 1, math.ceil(math.log2(max(len(angles), 2 * reach + 1) / 8)))
-    cell_m, centre, origin = likelihood.cell_m, window.centre, likelihood.origin_m
+    cell_m, origin = likelihood.cell_m, likelihood.origin_m
     # neighbours are met or missed together: far from one another, few points tell of all
     spread = np.argsort(np.arange(len(points)) * SPREAD % 1.0, kind="stable")
     points, tangents = points[spread], tangents[spread]
@@ -76,7 +88,7 @@ def search(
     _project_all(points, tangents, angles, frame, size, firsts, blocks, cells, places, safe)
     _bound_all(table, bounds, top, blocks[firsts[-2] :], nodes, limits)
     order = np.argsort(-limits, kind="stable")
-    found, angle, dx, dy = _search(
+    score, angle, dx, dy = _search(
         grids,
         table,
         bounds,
@@ -89,12 +101,9 @@ def search(
         limits[order],
         reach,
         floor,
-        discs,
+        barred,
     )
-    if found < 0.0:
-        return None
-    place = np.array([centre[0] + dx * cell_m, centre[1] + dy * cell_m, angles[angle]])
-    return Peak(place, found)
+    return score, angles[angle], dx, dy
 
 
 @lean_part

@@ -8,13 +8,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.slam import wide_search
-from bsmap_cli.slam.correlative import Window, search
 from bsmap_cli.slam.likelihood import CHANNELS, Likelihood, _pyramid, build_likelihood
+from bsmap_cli.slam.search_window import Window
 from tests.mapping.walls import new_map
 from tests.slam.rooms import CENTRE, map_of, room_parts, seen_from
 
 seeds = st.integers(0, 2**32)
 ROOM = map_of(room_parts())
+ENGINES = pytest.mark.parametrize("few", [math.inf, 0], ids=["by angle", "by blocks of angles"])
+
+
+def search(*asked, few=wide_search.FEW_BLOCKS, **rest):
+    """The search, with so many blocks asked one by one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wide_search, "FEW_BLOCKS", few)
+        return wide_search.search(*asked, **rest)
 
 
 def naive_score(likelihood, points, tangents, pose):
@@ -103,9 +111,12 @@ def test_an_empty_map_is_unlikely_everywhere():
     assert search(likelihood, points, np.eye(2)[[0] * 20], window, floor=0.1) is None
 
 
-@given(seeds, st.integers(1, 5), st.floats(0.0, 0.7), st.floats(0.0, 0.4))
+@ENGINES
+@given(
+    seed=seeds, heights=st.integers(1, 5), reach_m=st.floats(0.0, 0.7), reach_rad=st.floats(0, 0.4)
+)
 @settings(max_examples=30, deadline=None)
-def test_branch_and_bound_equals_exhaustive_search(seed, heights, reach_m, reach_rad):
+def test_branch_and_bound_equals_exhaustive_search(few, seed, heights, reach_m, reach_rad):
     random = np.random.default_rng(seed)
     likelihood = random_likelihood(random, heights)
     points = random.uniform(-0.6, 0.6, (int(random.integers(1, 12)), 2))
@@ -114,7 +125,7 @@ def test_branch_and_bound_equals_exhaustive_search(seed, heights, reach_m, reach
     middle = likelihood.origin_m + 0.05 * np.array(likelihood.grids.shape[:1:-1])
     window = Window(np.array([*middle, random.uniform(-4.0, 4.0)]), reach_m, reach_rad)
     expected = exhaustive(likelihood, points, tangents, window)
-    peak = search(likelihood, points, tangents, window, floor=0.0)
+    peak = search(likelihood, points, tangents, window, floor=0.0, few=few)
     if expected == 0.0:
         assert peak is None
         return
@@ -123,9 +134,10 @@ def test_branch_and_bound_equals_exhaustive_search(seed, heights, reach_m, reach
     assert off.max() <= math.ceil(reach_m / 0.1) * 0.1 + 1e-9
 
 
-@given(seeds, st.integers(1, 5))
+@ENGINES
+@given(seed=seeds, heights=st.integers(1, 5))
 @settings(max_examples=20, deadline=None)
-def test_rival_is_the_best_outside_the_barred_disc(seed, heights):
+def test_rival_is_the_best_outside_the_barred_disc(few, seed, heights):
     random = np.random.default_rng(seed)
     likelihood = random_likelihood(random, heights)
     points = random.uniform(-0.6, 0.6, (6, 2))
@@ -141,16 +153,19 @@ def test_rival_is_the_best_outside_the_barred_disc(seed, heights):
         return not (near and abs(pose[2] - peak.pose[2]) < 0.17)
 
     expected = exhaustive(likelihood, points, tangents, window, allowed)
-    rival = search(likelihood, points, tangents, window, floor=0.0, barred=peak, apart_m=0.25)
+    rival = search(
+        likelihood, points, tangents, window, floor=0.0, barred=peak, apart_m=0.25, few=few
+    )
     assert (0.0 if rival is None else rival.score) == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_peak_is_no_rival_of_itself_across_the_seam_of_the_circle():
+@ENGINES
+def test_a_peak_is_no_rival_of_itself_across_the_seam_of_the_circle(few):
     """All round, the first and the last angle are the same place."""
     clusters = seen_from(CENTRE, room_parts(0.1))
     likelihood = build_likelihood(ROOM, cell_m=0.1, heights=4)
     window = Window(np.add(CENTRE.as_array(), (0.0, 0.0, math.pi)), 0.3, math.pi)
-    peak = search(likelihood, clusters.points, clusters.tangents, window, floor=0.5)
+    peak = search(likelihood, clusters.points, clusters.tangents, window, floor=0.5, few=few)
     rival = search(
         likelihood,
         clusters.points,
@@ -159,6 +174,7 @@ def test_a_peak_is_no_rival_of_itself_across_the_seam_of_the_circle():
         floor=peak.score / 1.1,
         barred=peak,
         apart_m=1.0,
+        few=few,
     )
     assert rival is None
 
@@ -198,12 +214,9 @@ def test_blocks_of_angles_leave_no_better_pose_out(seed, heights, far_m, floor):
     centre = np.array([*middle, random.uniform(-4.0, 4.0)])
     window = Window(centre, random.uniform(0.0, 3.0), random.uniform(0.0, 4.0))
     asked = (likelihood, points, tangents, window)
-    one = search(*asked, floor=floor)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wide_search, "FEW_BLOCKS", 0)
-        two = wide_search.search(*asked, floor=floor)
+    one, two = (search(*asked, floor=floor, few=few) for few in (math.inf, 0))
+    assert (two and two.score) == pytest.approx(one and one.score)
+    if one is not None:
+        rest = {"floor": floor, "barred": one, "apart_m": 0.3}
+        one, two = (search(*asked, **rest, few=few) for few in (math.inf, 0))
         assert (two and two.score) == pytest.approx(one and one.score)
-        if one is not None:
-            two = wide_search.search(*asked, floor=floor, barred=one, apart_m=0.3)
-            one = search(*asked, floor=floor, barred=one, apart_m=0.3)
-            assert (two and two.score) == pytest.approx(one and one.score)
