@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 from bsmap_cli.mapping.fitting import FittingSettings
+from bsmap_cli.mapping.levels import Levels
 from bsmap_cli.mapping.segmentation import Clusters, SegmentationSettings, find_clusters
 from bsmap_cli.sensor.gate import Returns
 
 
-class ScanLevels(Sequence[Clusters]):
+class ScanLevels(Levels[Clusters]):
     """Clusters for each knot step, coarse to fine; coarser ones are made when asked for.
 
     A scan that is tracked at the finest level, and is no keyframe, never needs them.
@@ -25,20 +25,11 @@ class ScanLevels(Sequence[Clusters]):
     def __len__(self) -> int:
         return len(self._levels)
 
-    @overload
-    def __getitem__(self, index: int) -> Clusters: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> list[Clusters]: ...
-
-    def __getitem__(self, index: int | slice) -> Clusters | list[Clusters]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        k = range(len(self))[index]
+    def _at(self, k: int) -> Clusters:
         level = self._levels[k]
         if level is None:
             step = self._ladder[k]
-            level = self[k + 1].coarser(step, self._thinning * step, self._sigma_m)
+            level = self._at(k + 1).coarser(step, self._thinning * step, self._sigma_m)
             self._levels[k] = level
         return level
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.levels import Levels
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.keyframes import CompactClusters
 
 
-class SubmapLevels(Sequence[CurveMap]):
+class SubmapLevels(Levels[CurveMap]):
     """Curve maps, coarse to fine.
 
     Most scans are tracked on the finest level alone, and in most submaps no loop is sought: their
@@ -29,18 +29,10 @@ class SubmapLevels(Sequence[CurveMap]):
     def __len__(self) -> int:
         return len(self._levels)
 
-    @overload
-    def __getitem__(self, index: int) -> CurveMap: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> list[CurveMap]: ...
-
-    def __getitem__(self, index: int | slice) -> CurveMap | list[CurveMap]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        if self._waiting and range(len(self))[index] < len(self) - 1:
+    def _at(self, k: int) -> CurveMap:
+        if self._waiting and k < len(self) - 1:
             self._draw_waiting()
-        return self._levels[index]
+        return self._levels[k]
 
     def insert(
         self,

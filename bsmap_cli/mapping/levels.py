@@ -1,0 +1,27 @@
+"""Something for each level of the ladder, made when it is asked for."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import TypeVar, overload
+
+Level = TypeVar("Level")
+
+
+class Levels(Sequence[Level]):
+    """A sequence, coarse to fine, that needs only its length and `_at`."""
+
+    @overload
+    def __getitem__(self, index: int) -> Level: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Level]: ...
+
+    def __getitem__(self, index: int | slice) -> Level | list[Level]:
+        places = range(len(self))[index]
+        return self._at(places) if isinstance(places, int) else [self._at(k) for k in places]
+
+    @abstractmethod
+    def _at(self, k: int) -> Level:
+        """The level at `k`, from 0 to the length."""
