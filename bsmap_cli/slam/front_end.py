@@ -20,11 +20,14 @@ class FrontEnd:
     """Turns scans into clusters, in the order of the log; learns the noise on the way.
 
     sigma_m : deviation of the range noise [m], after the last scan.
+    twist : (3,) velocity (vx, vy [m/s], omega [rad/s]) of the base during the last scan; None for
+    logs that do not say when each beam was fired.
     """
 
     def __init__(self, settings: SlamSettings) -> None:
         self._settings = settings
         self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
+        self.twist: Vector | None = None
         self._last_stamp_ns: int | None = None
 
     @property
@@ -36,15 +39,14 @@ class FrontEnd:
         """Clusters of one scan, coarse to fine; `last_step` is the motion since the scan before."""
         settings = self._settings
         self._noise.observe(scan)
-        twist = self._twist(scan, last_step)
+        self.twist = self._twist(scan, last_step)
         self._last_stamp_ns = scan.stamp_ns
-        returns = find_returns(scan, settings.sensor, settings.ladder[-1], twist)
+        returns = find_returns(scan, settings.sensor, settings.ladder[-1], self.twist)
         return scan_levels(
             returns, settings.ladder, settings.segmentation, settings.fitting, self.sigma_m
         )
 
     def _twist(self, scan: Scan, last_step: SE2) -> Vector | None:
-        """Velocity (vx, vy, omega) of the base, for logs that say when each beam was fired."""
         if self._last_stamp_ns is None:
             return None
         elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)

@@ -12,13 +12,11 @@ import numpy as np
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.map_document import MapDocument
-from bsmap_cli.mapping.scan_levels import scan_levels
-from bsmap_cli.sensor.gate import find_returns
-from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.sight import find_sight
 from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.final_map import final_map
+from bsmap_cli.slam.front_end import FrontEnd
 from bsmap_cli.slam.full_graph import solve_full_graph
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.known_map import KnownMap
@@ -65,13 +63,12 @@ class Slam:
         self.settings = settings
         self._known = known
         self._log = ScanLog()
-        self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
+        self._front = FrontEnd(settings)
         self._local: LocalSlam | None = None
         self._closer: LoopCloser | None = None
         self._lost: list[dict[str, int]] = []
         self._degenerate = 0
         self._was_lost = False
-        self._last_stamp_ns = 0
         self.seconds = {
             "fit": 0.0,
             "register": 0.0,
@@ -85,17 +82,13 @@ class Slam:
         """Track one scan, insert it if it is a keyframe, and look for loops."""
         settings = self.settings
         started = time.perf_counter()
-        sigma_m = self._noise.observe(scan)
+        step = self._local.last_step if self._local else SE2.identity()
+        clusters = self._front.clusters(scan, step)
         if self._local is None or self._closer is None:
-            self._local = LocalSlam(settings, sigma_m)
+            self._local = LocalSlam(settings, self._front.sigma_m)
             self._closer = LoopCloser(self._local, SubmapGraph(self._local))
-        self._local.sigma_m = sigma_m
         local = self._local
-        twist = self._twist(scan)
-        returns = find_returns(scan, settings.sensor, settings.ladder[-1], twist)
-        clusters = scan_levels(
-            returns, settings.ladder, settings.segmentation, settings.fitting, local.sigma_m
-        )
+        local.sigma_m = self._front.sigma_m
         segmented = time.perf_counter()
         index = len(self._log.stamps_ns)
         tracked = local.process(index, scan.stamp_ns, clusters, scan.pose_odom_base)
@@ -107,32 +100,23 @@ class Slam:
         self._log.add(scan.stamp_ns, len(local.keyframes) - 1, tracked.pose_local)
         self._degenerate += tracked.degenerate
         self._note_loss(tracked.lost, scan.stamp_ns)
-        self._last_stamp_ns = scan.stamp_ns
         if tracked.keyframe:
-            self._look(scan, tracked.keyframe, twist)
+            self._look(scan, tracked.keyframe)
         if tracked.keyframe and settings.loops.enabled and self._closer:
             self._closer.process(tracked.keyframe)
             self.seconds["loops"] += time.perf_counter() - done
 
-    def _look(self, scan: Scan, keyframe: Keyframe, twist: np.ndarray | None) -> None:
+    def _look(self, scan: Scan, keyframe: Keyframe) -> None:
         """Let the map fade where the keyframe looks through it, or remember that for the end."""
         settings, local = self.settings, self._local
         method = settings.visibility.method
         if method == "off" or local is None:
             return
-        sight = find_sight(scan, settings.sensor, settings.ladder[-1], twist)
+        sight = find_sight(scan, settings.sensor, settings.ladder[-1], self._front.twist)
         if method == "fade":
             local.fade(keyframe, sight)
         if method == "evidence" or settings.final_map.rebuild:
             keyframe.sight = sight
-
-    def _twist(self, scan: Scan) -> np.ndarray | None:
-        """Velocity (vx, vy, omega) of the base, for logs that say when each beam was fired."""
-        elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)
-        sweep = abs(scan.time_increment_s) * len(scan.ranges_m)
-        if self._local is None or not 0.0 < sweep <= 1.5 * elapsed:
-            return None
-        return self._local.last_step.as_array() / elapsed
 
     def _note_loss(self, lost: bool, stamp_ns: int) -> None:
         if lost and not self._was_lost:
