@@ -158,5 +158,7 @@ class LocalSlam:
 
     def _begin_anew(self) -> None:
         """Leave the active submaps as they are and start on new ground."""
+        for submap in self.submaps[self.finished :]:
+            submap.finish()
         self.finished = len(self.submaps)
         self._begin_submap()
