@@ -10,15 +10,17 @@ points (n, 3) float64 of all returns in the base frame, z = 0, starts (scans + 1
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
+from runpy import run_path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+PEAK_MEMORY = Path(__file__).parent.parent / "bsmap_cli" / "pipeline" / "peak_memory.py"
 VOXEL_M = 0.2
 Step = Callable[[Any, Any], Any]  # points (n, 3) and the guessed step (4, 4) or None: the pose
 
@@ -104,9 +106,8 @@ def main() -> None:
             found[k] = pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])
         seconds = perf_counter() - began
     np.save(poses, found)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024
-    print(json.dumps({"seconds": seconds, "peak_memory_mb": round(peak / unit, 1)}))
+    peak_mb = run_path(str(PEAK_MEMORY))["peak_memory_mb"]()  # bsmap itself is not installed here
+    print(json.dumps({"seconds": seconds, "peak_memory_mb": round(peak_mb, 1)}))
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
+from bsmap_cli.pipeline.peak_memory import peak_memory_mb
 from bsmap_cli.pipeline.runs import Run
 
 STAGES = ("read", "fit", "register", "merge", "loops", "graph", "final_map", "write")
@@ -41,7 +41,7 @@ def full_report(
         "scans_per_second": _rate(scans, seconds),
         "tracking_scans_per_second": _rate(scans, tracking_s),
         "realtime_factor": _rate(run.span_s, seconds) if run.span_s > 0 else None,
-        "peak_memory_mb": round(_peak_memory_mb(), 1),
+        "peak_memory_mb": round(peak_memory_mb(), 1),
         "travelled_m": run.figures["travelled_m"],
         "map": map_report,
         "settings": run.figures["settings"],
@@ -50,10 +50,3 @@ def full_report(
 
 def _rate(amount: float, seconds: float) -> float | None:
     return round(amount / seconds, 2) if seconds > 0 else None
-
-
-def _peak_memory_mb() -> float:
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
