@@ -14,10 +14,12 @@ if TYPE_CHECKING:
     from bsmap_cli.logs.reader import ReadReport
 
 
-def tell_warnings(report: ReadReport, talk: Talk) -> None:
-    """Say what the reader found worth a word."""
+def tell_warnings(report: ReadReport, talk: Talk, *, found: bool = True) -> None:
+    """Say what the reader found worth a word; `found`: also what `check` has a finding of."""
+    said = () if found else {line for lines in report.found.values() for line in lines}
     for warning in report.warnings:
-        talk.warn(warning)
+        if warning not in said:
+            talk.warn(warning)
 
 
 def reading_losses(report: ReadReport) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bsmap_cli.logs.finding import OFTEN_SHARE, Finding, counted, worse_if
-from bsmap_cli.logs.reader import ReadReport
+from bsmap_cli.logs.reader import TELL_PLACE, ReadReport
 
 CLOCKS_APART_S = 1.0
 
@@ -43,7 +43,7 @@ def _of_lasers(report: ReadReport) -> Iterator[Finding]:
         yield Finding(
             name="mounting",
             level="warning",
-            message="the log does not tell where the laser sits on the base",
+            message=_as_read(report, "mounting", "the log does not tell where the laser sits"),
             remedy="give --laser-pose x,y,yaw_deg; or let the log tell it: in /tf_static, or in CSV"
             " columns laser_x,laser_y,laser_theta",
             value=1.0,
@@ -52,8 +52,9 @@ def _of_lasers(report: ReadReport) -> Iterator[Finding]:
         yield Finding(
             name="tilt",
             level="problem",
-            message=f"the laser is tilted by {report.tilt_deg:.0f} degrees, its scans are taken as"
-            " if they were level",
+            message=_as_read(
+                report, "tilt", f"the laser is tilted by {report.tilt_deg:.0f} degrees"
+            ),
             remedy="choose a level laser with --topic; if the tilt in the log is wrong, give"
             " --laser-pose x,y,yaw_deg",
             value=report.tilt_deg,
@@ -62,11 +63,17 @@ def _of_lasers(report: ReadReport) -> Iterator[Finding]:
         yield Finding(
             name="moving laser",
             level="problem",
-            message="the laser moves on the base, its first place is used for the whole log",
+            message=_as_read(report, "moving laser", "the laser moves on the base"),
             remedy="choose a fixed laser with --topic; if it is fixed indeed, give --laser-pose"
             " x,y,yaw_deg",
             value=1.0,
         )
+
+
+def _as_read(report: ReadReport, name: str, otherwise: str) -> str:
+    """What the reader said of each laser: it knows their frames."""
+    lines = [line.removesuffix(TELL_PLACE) for line in report.found.get(name, [])]
+    return "; ".join(lines) or otherwise
 
 
 def _of_clocks(report: ReadReport) -> Iterator[Finding]:

@@ -21,7 +21,7 @@ from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
-from bsmap_cli.logs.text_log import TextScan, bad_line, lines_of, stamp_ns_of
+from bsmap_cli.logs.text_log import TextScan, bad_line, lines_of, place_of, stamp_ns_of
 from bsmap_cli.sensor.scan import Ranges
 
 TOPIC = "csv"
@@ -71,7 +71,8 @@ class CsvParser:
                     continue
                 try:
                     cells = _cells(text, header.separator)
-                    yield self._scan(cells, header, is_whole=line.endswith(b"\n"))
+                    scan = self._scan(cells, header, is_whole=line.endswith(b"\n"))
+                    yield scan._replace(place=place_of(number, source))
                 except (ValueError, BadMessageError) as error:
                     yield bad_line(number, source, error)
 

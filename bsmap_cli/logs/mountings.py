@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from bsmap_cli.logs.messages import TransformRecord
-from bsmap_cli.logs.reader import ReadOptions, ReadReport
+from bsmap_cli.logs.reader import TELL_PLACE, ReadOptions, ReadReport
 from bsmap_cli.logs.transforms import (
     Matrix,
     Mounting,
@@ -52,7 +52,8 @@ class Mountings:
             self._report.tilt_deg = max(self._report.tilt_deg, tilt_deg)
             self._report.warn(
                 f"{frame} is tilted by {tilt_deg:.0f} degrees: its scans"
-                " are taken as if they were level"
+                " are taken as if they were level",
+                finding="tilt",
             )
         return mounting
 
@@ -81,11 +82,14 @@ class Mountings:
             if not is_posed:
                 self._unplaced.add(frame)
                 self._report.places_unknown = True
-                self._report.warn(_taken_as_base(frame, base))
+                self._report.warn(_taken_as_base(frame, base), finding="mounting")
             return np.eye(4)
         if self._tree.moves(base, frame):
             self._report.places_move = True
-            self._report.warn(f"{frame} moves on {base}: its first place is used for the whole log")
+            self._report.warn(
+                f"{frame} moves on {base}: its first place is used for the whole log",
+                finding="moving laser",
+            )
         return matrix
 
 
@@ -102,7 +106,5 @@ def _is_identity(matrix: Matrix) -> bool:
 def _taken_as_base(frame: str, base: str | None) -> str:
     missing = f" from {base}" if base else ""
     laser = f"'{frame}', the frame of the scans," if frame else "the laser"
-    return (
-        f"no transform{missing} to {laser} in the log: the laser is taken to be the base"
-        " (tell its place with --laser-pose x,y,yaw_deg)"
-    )
+    unknown = f"no transform{missing} to {laser} in the log"
+    return f"{unknown}: the laser is taken to be the base{TELL_PLACE}"

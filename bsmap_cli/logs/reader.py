@@ -10,6 +10,7 @@ from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.scan import Scan
 
 WARNINGS_LIMIT = 50
+TELL_PLACE = " (tell its place with --laser-pose x,y,yaw_deg)"
 """A log that is wrong in ever new ways must not fill the screen."""
 
 
@@ -53,6 +54,7 @@ class ReadReport:
     recorded_after_s : least and greatest time of recording minus stamp [s], where the log has
         both.
     warnings : one line each, for the user, without repetition.
+    found : those of them that are findings of `check_log`, by the finding's name.
     """
 
     scans_read: int = 0
@@ -66,16 +68,19 @@ class ReadReport:
     stamps_replaced: list[str] = field(default_factory=list)
     recorded_after_s: tuple[float, float] | None = None
     warnings: list[str] = field(default_factory=list)
+    found: dict[str, list[str]] = field(default_factory=dict)
 
     def skip_scan(self, fault: str) -> None:
         """Count a scan that cannot be read."""
         self.first_fault = self.first_fault or fault
         self.scans_skipped += 1
 
-    def warn(self, line: str) -> None:
-        """Tell the user once."""
+    def warn(self, line: str, *, finding: str = "") -> None:
+        """Tell the user once; `finding` is the name of the finding that says the same."""
         if line not in self.warnings and len(self.warnings) < WARNINGS_LIMIT:
             self.warnings.append(line)
+            if finding:
+                self.found.setdefault(finding, []).append(line)
 
     def lose(self, line: str) -> None:
         """Tell the user that part of the log is missing or damaged."""

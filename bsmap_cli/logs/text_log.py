@@ -12,7 +12,7 @@ from bsmap_cli.logs.byte_streams import DamagedBytesError
 from bsmap_cli.logs.drawn_log import DrawnLog
 from bsmap_cli.logs.laser import scan_of
 from bsmap_cli.logs.messages import SECOND_NS, BadMessageError, LaserRecord
-from bsmap_cli.logs.reader import LogInfo, ReadOptions, ReadReport, TopicInfo
+from bsmap_cli.logs.reader import TELL_PLACE, LogInfo, ReadOptions, ReadReport, TopicInfo
 from bsmap_cli.logs.sources import Source
 from bsmap_cli.logs.window import ScanWindow, Verdict
 from bsmap_cli.sensor.scan import Scan
@@ -30,12 +30,16 @@ _PLAINLY = {
 
 
 class TextScan(NamedTuple):
-    """One line that holds a scan; `pose_base_laser` is None where the log does not tell it."""
+    """One line that holds a scan; `pose_base_laser` is None where the log does not tell it.
+
+    place : which line of which file, where the parser tells it.
+    """
 
     topic: str
     record: LaserRecord
     pose_odom_base: SE2 | None
     pose_base_laser: SE2 | None
+    place: str = ""
 
 
 class TextParser(Protocol):
@@ -80,7 +84,7 @@ class TextLog(DrawnLog):
             try:
                 scan = self._scan(line)
             except BadMessageError as error:
-                self._skip(error)
+                self._skip(BadMessageError(f"{line.place}: {error}") if line.place else error)
                 continue
             self.report.scans_read += 1
             yield scan
@@ -135,7 +139,8 @@ class TextLog(DrawnLog):
             self.report.places_unknown = True
             self.report.warn(
                 "the log does not tell where the laser sits: it is taken to be the base"
-                " (tell its place with --laser-pose x,y,yaw_deg)"
+                + TELL_PLACE,
+                finding="mounting",
             )
             pose_base_laser = SE2.identity()
         pose_odom_base = line.pose_odom_base if options.odom == "auto" else None
@@ -166,7 +171,12 @@ def bad_line(number: int, source: Source, error: Exception) -> BadMessageError:
         what = pattern.sub(plain, what)
     if len(what) > _LONGEST_FAULT:
         what = what[:_LONGEST_FAULT] + " ..."
-    return BadMessageError(f"line {number} of {source.name}: {what}")
+    return BadMessageError(f"{place_of(number, source)}: {what}")
+
+
+def place_of(number: int, source: Source) -> str:
+    """A line, as a user is told of it."""
+    return f"line {number} of {source.name}"
 
 
 def lines_of(source: Source, report: ReadReport) -> Iterator[tuple[int, bytes]]:

@@ -169,3 +169,17 @@ def test_names_out_of_a_file_do_not_steer_the_terminal(tmp_path):
         said = ran.stdout + ran.stderr
         assert b"\x1b" not in said and b"\x07" not in said
         assert rb"\x1b" in said
+
+
+@pytest.mark.parametrize("kind", ["csv", "mcap"])
+def test_check_tells_once_that_the_laser_has_no_place(kind, tmp_path):
+    ros = Ros()
+    messages = [("/scan", SCAN, scan.stamp_ns, ros.scan(scan, frame="eye")) for scan in LOG]
+    rows = ["t,angle_min,angle_increment,r0,r1\n", *(f"{k},0,0.1,1,2\n" for k in range(9))]
+    log = "".join(rows).encode() if kind == "csv" else ros_mcap(messages, ros)
+    (tmp_path / "log").write_bytes(log)
+    ran = bsmap("check", "log", cwd=tmp_path)
+    assert ran.returncode == 0
+    assert (ran.stdout + ran.stderr).count(b"--laser-pose") == 1
+    assert ran.stdout.count(b"is taken to be the base") == 1
+    assert kind == "csv" or b"'eye'" in ran.stdout

@@ -359,3 +359,12 @@ def test_a_hanging_laser_by_option(tmp_path):
 
 def test_seconds_have_nine_digits():
     assert Decimal(seconds(SCANS[3].stamp_ns)) * 10**9 == SCANS[3].stamp_ns
+
+
+def test_a_row_without_beams_is_named(tmp_path):
+    path = written(
+        tmp_path, "t,angle_min,angle_increment,r0,r1\n1,0,0.1,1,2\n2,0,0.1\n3,0,0.1,1,2\n"
+    )
+    found, report = read(path)
+    assert len(found) == 2
+    assert report.first_fault == "line 3 of log: a scan without beams"

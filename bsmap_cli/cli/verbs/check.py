@@ -42,7 +42,7 @@ def run(
         listed = [asdict(finding) for finding in findings]
         print_json({"scans": scans, "findings": listed, "warnings": reader.report.warnings})
     else:
-        tell_warnings(reader.report, voice)
+        tell_warnings(reader.report, voice, found=False)
         found = counted(len(findings), "finding") if findings else "no findings"
         print_text(f"{counted(scans, 'scan')} read, {found}\n")
         for finding in findings:
