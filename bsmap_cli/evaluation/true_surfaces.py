@@ -5,40 +5,17 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from bsmap_cli.errors import LogError
 from bsmap_cli.geometry.se2 import Points, Vector
 
 PIECE_M = 0.02
 SHARP_COS = math.cos(math.radians(30.0))
 NEIGHBOURS = 8  # pieces whose middles are nearest: among them is the nearest piece
 HIT_M = 0.05  # a beam that ends farther from all surfaces hit none
-
-
-def surfaces_of(document: Any, *, at_s: float = math.inf) -> list[Points]:
-    """Polylines (k, 2) [m] of a GeoJSON FeatureCollection of LineStrings, world frame.
-
-    at_s : seconds after the first scan; features that come later (`from_s`) or have gone (`to_s`)
-    are left out. LogError where the document is something else.
-    """
-    polylines = []
-    try:
-        for feature in document["features"]:
-            properties = feature.get("properties") or {}
-            here = properties.get("from_s", -math.inf) <= at_s <= properties.get("to_s", math.inf)
-            if feature["geometry"]["type"] == "LineString" and here:
-                points = np.array(feature["geometry"]["coordinates"], np.float64)[:, :2]
-                polylines.append(points)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        raise LogError(f"the surfaces are not GeoJSON LineStrings: {error!r}") from error
-    if not polylines:
-        raise LogError("the surfaces hold no LineString: write them with `bsmap sim --surfaces`")
-    return polylines
 
 
 @dataclass(frozen=True, slots=True)

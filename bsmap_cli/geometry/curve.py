@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.basis import basis_matrix
-from bsmap_cli.geometry.se2 import SE2, Points, Vector
+from bsmap_cli.geometry.se2 import Points, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,15 +54,3 @@ class Curve:
         weights = powers @ basis_matrix(self.degree).T / self.knot_step_m**derivative
         active = self.control_points[span[:, None] + np.arange(self.degree + 1)]
         return np.asarray(np.einsum("ma,mac->mc", weights, active))
-
-    def transformed(self, pose_a_b: SE2) -> Curve:
-        """The curve in the outer frame: exact, because the basis functions sum to one."""
-        return Curve(
-            degree=self.degree,
-            knot_step_m=self.knot_step_m,
-            first_index=self.first_index,
-            control_points=pose_a_b.transform(self.control_points),
-            weights=self.weights,
-            tau_start_m=self.tau_start_m,
-            tau_end_m=self.tau_end_m,
-        )

@@ -1,15 +1,13 @@
 """Distance to the true surfaces: on maps whose error is known by construction."""
 
 import itertools
-import json
 import math
 
 import numpy as np
 import pytest
 
-from bsmap_cli.errors import LogError
 from bsmap_cli.evaluation.map_quality import map_quality
-from bsmap_cli.evaluation.true_surfaces import cut_surfaces, surfaces_of
+from bsmap_cli.evaluation.true_surfaces import cut_surfaces
 from bsmap_cli.geometry.se2 import SE2
 from tests.maps import arc_points, line_points, make_level
 
@@ -98,31 +96,6 @@ def test_a_circle_of_control_points_runs_inside_by_what_theory_says():
     circle = 0.5 * np.column_stack((np.cos(angle), np.sin(angle)))
     quality = map_quality(level, cut_surfaces([circle]))
     assert quality.rms_m == pytest.approx(0.1**2 / (6 * 0.5), rel=0.05)
-
-
-def feature(points, **properties):
-    geometry = {"type": "LineString", "coordinates": points}
-    return {"type": "Feature", "properties": properties, "geometry": geometry}
-
-
-def test_surfaces_that_come_and_go():
-    document = {
-        "type": "FeatureCollection",
-        "features": [
-            feature([[0, 0], [1, 0]]),
-            feature([[0, 1], [1, 1]], to_s=10.0),
-            feature([[0, 2], [1, 2]], from_s=10.0),
-        ],
-    }
-    document = json.loads(json.dumps(document))
-    assert [line[0, 1] for line in surfaces_of(document)] == [0, 2]
-    assert [line[0, 1] for line in surfaces_of(document, at_s=5.0)] == [0, 1]
-
-
-@pytest.mark.parametrize("document", [{}, [], {"features": [{}]}, {"features": []}, 3])
-def test_what_is_no_surfaces_document(document):
-    with pytest.raises(LogError, match="surfaces"):
-        surfaces_of(document)
 
 
 def test_an_empty_map_has_no_quality():
