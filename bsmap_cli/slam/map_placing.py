@@ -84,6 +84,7 @@ class MapPlacer:
         self._samples = sample_level(one_level(b), self._unit / SAMPLES_PER_STEP)
         if not len(self._samples.points):
             raise MapFileError("the second map draws no curve: there is nothing to place")
+        self._shares_m = _shares(self._samples)
         # B is turned about the middle of its curves, wherever its origin lies
         low, high = self._samples.points.min(axis=0), self._samples.points.max(axis=0)
         x, y = (0.5 * (low + high)).tolist()
@@ -220,8 +221,8 @@ class MapPlacer:
             float(met.sum() - DIFFERING * (close & ~met).sum())
             for met, close in ((on, near), (old_on, old_near))
         ]
-        aside = float((near & ~on).sum())
-        return _Found(pose, spacing_m * float(on.sum()), spacing_m * aside, spacing_m * min(told))
+        overlap_m, aside_m = (float(self._shares_m[met].sum()) for met in (on, near & ~on))
+        return _Found(pose, overlap_m, aside_m, spacing_m * min(told))
 
     def _met(
         self, tree: object, there: Points, points: Points, tangents: Points
@@ -239,6 +240,14 @@ class MapPlacer:
         apart = math.hypot(one.x - other.x, one.y - other.y)
         turn = abs(math.remainder(one.theta - other.theta, math.tau))
         return apart <= SAME_STEPS * self._unit and turn <= SAME_RAD
+
+
+def _shares(samples: LevelSamples) -> Vector:
+    """(n,) metres of a map's curves that each sample stands for: halfway to its neighbours."""
+    ways = np.hypot(*np.diff(samples.points, axis=0).T)
+    ways[np.diff(samples.piece) != 0] = 0.0
+    shares: Vector = 0.5 * (np.append(ways, 0.0) + np.append(0.0, ways))
+    return shares
 
 
 def _as_clusters(samples: LevelSamples) -> Clusters:
