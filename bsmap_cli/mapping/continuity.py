@@ -212,7 +212,7 @@ def cut_surfaces(
     kept: Points,
     bounds: Integers,
 ) -> int:
-    """Write the returns on surfaces to `kept`, first and end of each surface to `bounds`.
+    """Write the returns on surfaces to `kept`, first of each surface, and the end, to `bounds`.
 
     Surfaces of which less is seen than `least` are left out. The number of surfaces.
     """
@@ -237,7 +237,7 @@ def cut_surfaces(
             spacing = gap / (beams[found] - beams[last])
         else:
             if is_surface(end - start, length, least):
-                bounds[surfaces, 0], bounds[surfaces, 1] = start, end
+                bounds[surfaces] = start
                 surfaces += 1
                 start = end
             end = start
@@ -248,4 +248,5 @@ def cut_surfaces(
             before, last = last, found
             end += 1
         i = found + 1
+    bounds[surfaces] = start
     return surfaces

@@ -73,23 +73,11 @@ class Clusters:
     def __len__(self) -> int:
         return len(self.starts) - 1
 
-    def of_returns(self, fewest: int) -> Clusters:
-        """Without the clusters of fewer raw returns."""
-        returns = np.add.reduceat(self.counts, self.starts[:-1]) if len(self) else np.zeros(0)
-        kept = returns >= fewest
-        if kept.all():
-            return self
-        sizes = np.diff(self.starts)
-        chosen = np.repeat(kept, sizes)
-        starts = np.concatenate(([0], np.cumsum(sizes[kept])))
-        return Clusters(self.points[chosen], self.tangents[chosen], self.counts[chosen], starts)
-
     def coarser(self, knot_step_m: float, bin_m: float, sigma_m: float) -> Clusters:
         """The same clusters in wider bins, as a coarser level of the ladder sees them."""
         n = len(self.points)
         points, counts, starts = np.empty((n, 2)), np.empty(n), np.empty_like(self.starts)
-        bounds = np.stack((self.starts[:-1], self.starts[1:]), axis=1)
-        m = _thin(self.points, self.counts, bounds, bin_m, points, counts, starts)
+        m = _thin(self.points, self.counts, self.starts, bin_m, points, counts, starts)
         return Clusters.with_tangents(points[:m], counts[:m], starts, knot_step_m, sigma_m)
 
     @classmethod
@@ -117,15 +105,18 @@ def _thin(
     counts: Vector,
     starts: NDArray[np.int64],
 ) -> int:
-    """Average neighbours of a cluster that lie within one bin; the number of points left."""
+    """Average neighbours of a cluster that lie within one bin; the number of points left.
+
+    bounds, starts : first point of each cluster, and the end, before and after.
+    """
     n = 0
-    for c in range(len(bounds)):
+    for c in range(len(bounds) - 1):
         starts[c] = n
-        i = bounds[c, 0]
-        while i < bounds[c, 1]:
+        i = bounds[c]
+        while i < bounds[c + 1]:
             x = y = total = 0.0
             first = i
-            while i < bounds[c, 1]:
+            while i < bounds[c + 1]:
                 ahead_x, ahead_y = points[i, 0] - points[first, 0], points[i, 1] - points[first, 1]
                 if i > first and ahead_x * ahead_x + ahead_y * ahead_y >= bin_m * bin_m:
                     break
@@ -137,7 +128,7 @@ def _thin(
             thinned[n, 0] = x / total
             thinned[n, 1] = y / total
             n += 1
-    starts[len(bounds)] = n
+    starts[len(bounds) - 1] = n
     return n
 
 
@@ -177,7 +168,7 @@ def find_clusters(
         sigma_m=sigma_m if spaced else 0.0,
         fewest=settings.min_points,
     )
-    kept, bounds = np.empty((m, 2)), np.empty((m, 2), np.int64)
+    kept, bounds = np.empty((m, 2)), np.empty(m + 1, np.int64)
     clusters = cut_surfaces(
         returns.points_body,
         returns.ranges_m,
@@ -189,5 +180,5 @@ def find_clusters(
     )
     points, counts = np.empty((m, 2)), np.empty(m)
     starts = np.empty(clusters + 1, np.int64)
-    n = _thin(kept, np.ones(m), bounds[:clusters], bin_m, points, counts, starts)
+    n = _thin(kept, np.ones(m), bounds[: clusters + 1], bin_m, points, counts, starts)
     return Clusters.with_tangents(points[:n], counts[:n], starts, knot_step_m, sigma_m)

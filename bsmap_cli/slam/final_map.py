@@ -63,9 +63,9 @@ def build_map(
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
     for pose, keyframe in zip(poses, keyframes, strict=True):
-        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
-        drawn = finest.of_returns(settings.segmentation.faint_points)
-        clusters = ScanLevels(drawn, ladder, settings.fitting, sigma_m)
+        fewest = settings.segmentation.faint_points
+        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m, fewest=fewest)
+        clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
         for level, seen in zip(levels, clusters, strict=True):
             insert_clusters(level, seen, pose, settings)
     return levels

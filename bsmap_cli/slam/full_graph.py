@@ -50,9 +50,10 @@ def solve_full_graph(
     for submap in submaps:
         for k in submap.keyframes:
             pose = submap.to_submap(keyframes[k].pose_local)
-            information = isotropic_information(way_deviation(0.0, unit))
             if keyframes[k].submap == submap.index and np.any(keyframes[k].information):
-                information = match_information(keyframes[k].information, unit, frame_rad=0.0)
+                information = match_information(keyframes[k].information, unit)
+            else:
+                information = isotropic_information(way_deviation(0.0, unit))
             edges.add(
                 nodes_of_submaps + submap.index,
                 first + k,

@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bsmap_cli.geometry.se2 import SE2, Vector
-from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.sensor.sight import Sight
 from bsmap_cli.settings import setting
 
@@ -20,34 +17,6 @@ class KeyframeSettings:
 
     distance: float = setting(2.0, "way since the last keyframe [finest knot steps]", minimum=0.0)
     angle_deg: float = setting(7.0, "turn since the last keyframe", minimum=0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class CompactClusters:
-    """`Clusters` of the finest level in float32 and without tangents: what a keyframe keeps."""
-
-    points: NDArray[np.float32]
-    counts: NDArray[np.uint16]
-    starts: NDArray[np.int32]
-
-    @classmethod
-    def pack(cls, clusters: Clusters) -> CompactClusters:
-        """Keep what is needed to insert or match the clusters again."""
-        return cls(
-            clusters.points.astype(np.float32),
-            np.minimum(clusters.counts, 65535).astype(np.uint16),
-            clusters.starts.astype(np.int32),
-        )
-
-    def unpack(self, knot_step_m: float, sigma_m: float) -> Clusters:
-        """The clusters again, with their tangents."""
-        return Clusters.with_tangents(
-            self.points.astype(np.float64),
-            self.counts.astype(np.float64),
-            self.starts.astype(np.int64),
-            knot_step_m,
-            sigma_m,
-        )
 
 
 @dataclass(slots=True)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.sight import Sight
-from bsmap_cli.slam.keyframes import CompactClusters, Keyframe, is_keyframe
+from bsmap_cli.slam.keyframes import Keyframe, is_keyframe
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
 from bsmap_cli.slam.prediction import Cadence, Predictor
 from bsmap_cli.slam.registration import RegistrationResult

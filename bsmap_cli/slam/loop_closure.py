@@ -174,7 +174,7 @@ class LoopCloser:
             submap.index,
             keyframe.index,
             SE2.from_array(result.pose),
-            match_information(result.information, unit, frame_rad=0.0),
+            match_information(result.information, unit),
         )
         if reach_m > 10.0 * unit:
             self._confirm(loop, keyframe)

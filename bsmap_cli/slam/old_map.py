@@ -59,7 +59,7 @@ class OldMap:
                 continue
             result = self._finder.registered(k, poses[k])
             if self._finder.fits(result):
-                information = match_information(result.information, self._unit, frame_rad=0.0)
+                information = match_information(result.information, self._unit)
                 self._anchors[k] = Anchor(k, SE2.from_array(result.pose), information)
         return len(self._anchors) - before
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bsmap_cli.geometry.se2 import Vector
+from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.levels import Levels
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.slam.keyframes import CompactClusters
 
 
 class SubmapLevels(Levels[CurveMap]):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from bsmap_cli.geometry.se2 import Points
@@ -14,18 +12,16 @@ WEAK_STEPS, WEAK_RAD = 10.0, 0.35  # a lost stretch: finest knot steps, radians
 FLOOR_STEPS, FLOOR_RAD = 0.4, 0.006  # what no registration goes below: the bends of a submap
 
 
-def match_information(hessian: Points, knot_step_m: float, *, frame_rad: float) -> Points:
-    """Inverse covariance of a registered pose in its own frame, with a floor under the deviations.
+def match_information(hessian: Points, knot_step_m: float) -> Points:
+    """Inverse covariance of a registered pose, with a floor under the deviations.
 
-    hessian : (3, 3) of the data in map axes; the data alone are far too sure of themselves, as
-    the errors of map and scan do not average out.
+    hessian : (3, 3) of the data; the data alone are far too sure of themselves, as the errors of
+    map and scan do not average out.
     """
-    cos, sin = math.cos(frame_rad), math.sin(frame_rad)
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    tiny = np.diag([1e-4 / knot_step_m**2, 1e-4 / knot_step_m**2, 1e-2])
-    covariance = np.linalg.inv(turn.T @ hessian @ turn + tiny)
-    floor = np.diag([(FLOOR_STEPS * knot_step_m) ** 2] * 2 + [FLOOR_RAD**2])
-    return np.linalg.inv(covariance + floor)
+    tiny = _diagonal(1e-4 / knot_step_m**2, 1e-2)
+    floor = _diagonal((FLOOR_STEPS * knot_step_m) ** 2, FLOOR_RAD**2)
+    covariance = np.linalg.inv(hessian + tiny)
+    return np.asarray(np.linalg.inv(covariance + floor), np.float64)
 
 
 def way_deviation(
@@ -41,4 +37,8 @@ def way_deviation(
 
 def isotropic_information(deviation: tuple[float, float]) -> Points:
     """(3, 3) inverse covariance of equal deviation in x and y [m], and of the angle [rad]."""
-    return np.diag([deviation[0] ** -2.0] * 2 + [deviation[1] ** -2.0])
+    return _diagonal(deviation[0] ** -2.0, deviation[1] ** -2.0)
+
+
+def _diagonal(place: float, turn: float) -> Points:
+    return np.array([[place, 0.0, 0.0], [0.0, place, 0.0], [0.0, 0.0, turn]])

@@ -172,16 +172,3 @@ def test_three_beams_far_away_are_a_faint_surface_and_near_by_none():
     plain = dataclasses.replace(DEFAULT, faint_points=DEFAULT.min_points)
     assert len(clusters_of(far_wall(3, 15.0), plain)) == 0
     assert len(clusters_of(far_wall(5, 15.0), plain)) == 1
-
-
-def test_only_clusters_of_enough_returns_are_kept():
-    ranges = np.minimum(far_wall(3, 15.0), np.roll(far_wall(20, 2.0), 60))
-    both = clusters_of(ranges)
-    assert len(both) == 2
-    kept = both.of_returns(5)
-    assert len(kept) == 1
-    assert np.hypot(*kept.points.T).max() < 3.0
-    assert kept.counts.sum() == both.counts.sum() - 3
-    assert kept.starts.tolist() == [0, len(kept.points)]
-    assert both.of_returns(3) is both
-    assert len(both.of_returns(100)) == 0

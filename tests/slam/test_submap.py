@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.scan_levels import ScanLevels
-from bsmap_cli.slam.keyframes import CompactClusters
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.submap_levels import SubmapLevels
 from tests.slam.rooms import room_parts, seen_from
