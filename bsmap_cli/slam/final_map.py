@@ -16,7 +16,7 @@ from bsmap_cli.mapping.thaw import thaw_level
 from bsmap_cli.mapping.trimming import remove_guessed
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.contradicted import remove_contradicted
-from bsmap_cli.slam.keyframes import Keyframe
+from bsmap_cli.slam.keyframes import Keyframe, every_nth
 from bsmap_cli.slam.ladder import register_near
 from bsmap_cli.slam.uncertainty import isotropic_information
 
@@ -55,19 +55,24 @@ def build_map(
     settings: SlamSettings,
     sigma_m: float,
     old: Sequence[MapLevel] = (),
+    *,
+    sparse: bool = False,
 ) -> list[CurveMap]:
     """Algorithm 1 over all keyframes; one map for each knot step of `ladder`.
 
     old : levels that the keyframes go on with, one for each knot step; empty: from nothing.
+    sparse : draw coarser levels from as few keyframes as it takes.
     """
+    apart = [every_nth(step, settings.ladder[-1]) if sparse else 1 for step in ladder]
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
-    for pose, keyframe in zip(poses, keyframes, strict=True):
+    for n, (pose, keyframe) in enumerate(zip(poses, keyframes, strict=True)):
         fewest = settings.segmentation.faint_points
         finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m, fewest=fewest)
         clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
-        for level, seen in zip(levels, clusters, strict=True):
-            insert_clusters(level, seen, pose, settings)
+        for k, level in enumerate(levels):
+            if n % apart[k] == 0:
+                insert_clusters(level, clusters[k], pose, settings)
     return levels
 
 
@@ -114,7 +119,8 @@ def final_map(
     for turn in range(settings.final_map.rounds):
         # once all poses agree with one map, none needs to be drawn in from farther off
         ladder = settings.ladder[-(settings.final_map.levels if turn == 0 else 1) :]
-        levels = build_map(poses, keyframes, ladder, settings, sigma_m, old[-len(ladder) :])
+        before = old[-len(ladder) :]
+        levels = build_map(poses, keyframes, ladder, settings, sigma_m, before, sparse=True)
         poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
     before = old[-len(written) :]

@@ -41,6 +41,11 @@ class Keyframe:
     sight: Sight | None = None
 
 
+def every_nth(knot_step_m: float, finest_step_m: float) -> int:
+    """Which keyframes a coarser level needs: their distance is set for the finest."""
+    return max(1, round(knot_step_m / finest_step_m))
+
+
 def is_keyframe(step: SE2, settings: KeyframeSettings, finest_step_m: float) -> bool:
     """Has the base moved or turned enough since the last keyframe? With 0, every scan has."""
     return math.hypot(step.x, step.y) >= settings.distance * finest_step_m or abs(

@@ -77,7 +77,7 @@ class Submap:
 
     def finish(self) -> None:
         """It will hold no further keyframe: give back what only a growing one needs."""
-        self.levels[-1].trim()
+        self._drawn.finish()
         self.forget_likelihood()
 
     def forget_likelihood(self) -> None:

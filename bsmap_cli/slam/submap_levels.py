@@ -12,6 +12,7 @@ from bsmap_cli.mapping.levels import Levels
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
+from bsmap_cli.slam.keyframes import every_nth
 
 
 class SubmapLevels(Levels[CurveMap]):
@@ -24,7 +25,9 @@ class SubmapLevels(Levels[CurveMap]):
     def __init__(self, settings: MappingSettings) -> None:
         self._settings = settings
         self._levels = [CurveMap(step, settings.degree) for step in settings.ladder]
-        self._waiting: list[tuple[CompactClusters, Vector, float]] = []
+        self._waiting: list[tuple[int, CompactClusters, Vector, float]] = []
+        self._inserted = 0
+        self._apart = [1] * (len(self._levels) - 1)
 
     def __len__(self) -> int:
         return len(self._levels)
@@ -47,12 +50,23 @@ class SubmapLevels(Levels[CurveMap]):
                 insert_clusters(level, seen, pose_submap_base, self._settings)
             return
         insert_clusters(self._levels[-1], clusters[-1], pose_submap_base, self._settings)
-        self._waiting.append((packed, pose_submap_base, sigma_m))
+        self._waiting.append((self._inserted, packed, pose_submap_base, sigma_m))
+        self._inserted += 1
+
+    def finish(self) -> None:
+        """Nothing more will be inserted: what waits is drawn from as few keyframes as it takes.
+
+        At the end of a map that grows, a scan needs them all.
+        """
+        ladder = self._settings.ladder
+        self._levels[-1].trim()
+        self._apart = [every_nth(step, ladder[-1]) for step in ladder[:-1]]
 
     def _draw_waiting(self) -> None:
         ladder, fitting = self._settings.ladder, self._settings.fitting
-        for packed, pose, sigma_m in self._waiting:
+        for n, packed, pose, sigma_m in self._waiting:
             scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
-            for level, seen in zip(self._levels[:-1], scan, strict=False):
-                insert_clusters(level, seen, pose, self._settings)
+            for k, level in enumerate(self._levels[:-1]):
+                if n % self._apart[k] == 0:
+                    insert_clusters(level, scan[k], pose, self._settings)
         self._waiting.clear()

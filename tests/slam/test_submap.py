@@ -6,9 +6,10 @@ import pytest
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.scan_levels import ScanLevels
+from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.submap_levels import SubmapLevels
-from tests.slam.rooms import room_parts, seen_from
+from tests.slam.rooms import room_parts, seen_from, signed_distance
 
 SETTINGS = SlamSettings()
 SIGMA_M = 0.005
@@ -49,3 +50,15 @@ def test_a_submap_has_one_level_for_each_knot_step():
     assert [level.knot_step_m for level in levels[1:]] == list(SETTINGS.ladder[1:])
     with pytest.raises(IndexError):
         levels[3]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_finished_submap_draws_its_coarser_levels_from_fewer_keyframes(level):
+    """And shows the same walls: keyframes are as close as the finest level needs them."""
+    full, sparse = drawn(asking_after=()), drawn(asking_after=())
+    sparse.finish()
+    every, few = (sample_surfaces(levels[level], 0.02)[0] for levels in (full, sparse))
+    assert sparse[level].arrays.weights.max() < full[level].arrays.weights.max()
+    assert np.abs(signed_distance(few)).max() < 0.1 * SETTINGS.ladder[level]
+    apart = np.hypot(*(every[:, None] - few[None]).transpose(2, 0, 1)).min(axis=1)
+    assert apart.max() < SETTINGS.ladder[level]
