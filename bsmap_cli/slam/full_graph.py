@@ -49,6 +49,8 @@ def solve_full_graph(
     edges = EdgeList()
     for submap in submaps:
         for k in submap.keyframes:
+            if k != submap.keyframes[0] and not np.any(keyframes[k].information):
+                continue  # it coasted, and lies in the submap no better than its neighbours know
             pose = submap.to_submap(keyframes[k].pose_local)
             if keyframes[k].submap == submap.index and np.any(keyframes[k].information):
                 information = match_information(keyframes[k].information, unit)
@@ -65,7 +67,11 @@ def solve_full_graph(
         step = keyframes[k].pose_local.relative_to(keyframes[k - 1].pose_local)
         way = math.hypot(step.x, step.y)
         deviation = way_deviation(
-            way, unit, coasted_m=keyframes[k].coasted_m, weak=keyframes[k].weak
+            way,
+            unit,
+            coasted_m=keyframes[k].coasted_m,
+            coasted_rad=keyframes[k].coasted_rad,
+            weak=keyframes[k].weak,
         )
         edges.add(
             first + k - 1, first + k, step.as_array(), isotropic_information(deviation), loop=False

@@ -25,9 +25,9 @@ class Keyframe:
 
     scan_index : its place in the trajectory. pose_local : (3,) where tracking saw the base, in
     the drifting local frame. submap : index of the submap it was matched against.
-    information : (3, 3) of that match. coasted_m : what the way from the last keyframe may be off
-    because no wall told. weak : tracking had lost the map here. sight : what the scan looked
-    through, where that is asked for.
+    information : (3, 3) of that match. coasted_m, coasted_rad : what the way and the turn from the
+    last keyframe may be off because no wall told. weak : tracking had lost the map here.
+    sight : what the scan looked through, where that is asked for.
     """
 
     index: int
@@ -37,6 +37,7 @@ class Keyframe:
     submap: int
     information: Vector
     coasted_m: float
+    coasted_rad: float
     weak: bool
     sight: Sight | None = None
 

@@ -47,7 +47,9 @@ class LocalSlam:
     merge_seconds: float = 0.0
     _pose: SE2 = field(default_factory=SE2.identity)
     _lost_scans: int = 0
+    _afresh: bool = False
     _coasted_m: float = 0.0
+    _coasted_rad: float = 0.0
     _explained: float = 1.0
     _cadence: Cadence = field(default_factory=Cadence)
     _predictor: Predictor = field(init=False)
@@ -95,20 +97,26 @@ class LocalSlam:
         self._lost_scans = self._lost_scans + 1 if lost else 0
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
+        if lost or not told:
+            self._coasted_rad += prediction.drift_rad
         measured = told and not lost and not result.degenerate
         step = pose.relative_to(self._pose)
         sigma_m = result.worst_sigma_m if measured else 0.0
         self._predictor.observe(step, pose_odom_base, measured=measured, sigma_m=sigma_m)
         self._pose, self._explained = pose, result.inlier_ratio
+        self._afresh = self._afresh and (lost or not told)
+        moved = pose.relative_to(self.keyframes[-1].pose_local)
+        due = is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1])
         keyframe = None
-        if self._lost_scans >= self.settings.recovery.patience:
+        if lost and self._afresh and prediction.by_odometry:
+            # new ground would hold as little of such scans as this does: they are too sparse
+            keyframe = self._insert(scan_index, clusters, None, False) if due else None
+        elif self._lost_scans >= self.settings.recovery.patience:
             self._begin_anew()
             keyframe = self._insert(scan_index, clusters, None, True)
             self._lost_scans = 0
-        elif not lost and told:
-            moved = pose.relative_to(self.keyframes[-1].pose_local)
-            if is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1]):
-                keyframe = self._insert(scan_index, clusters, result, False)
+        elif not lost and told and due:
+            keyframe = self._insert(scan_index, clusters, result, False)
         return Tracked(pose, keyframe, lost, result.degenerate > 0)
 
     @property
@@ -132,10 +140,11 @@ class LocalSlam:
             submap=self.finished,
             information=result.information if result else np.zeros((3, 3)),
             coasted_m=self._coasted_m,
+            coasted_rad=self._coasted_rad,
             weak=weak,
         )
         self.keyframes.append(keyframe)
-        self._coasted_m = 0.0
+        self._coasted_m = self._coasted_rad = 0.0
         began = time.perf_counter()
         for submap in self.submaps[self.finished :]:
             submap.insert(keyframe, clusters, self.sigma_m)
@@ -163,3 +172,4 @@ class LocalSlam:
             submap.finish()
         self.finished = len(self.submaps)
         self._begin_submap()
+        self._afresh = True

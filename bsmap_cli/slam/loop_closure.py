@@ -27,6 +27,8 @@ from bsmap_cli.slam.wide_search import search
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
+LEAST_SCORE = 0.5  # of a place worth refining; right ones mostly score 0.7 and more
+RETRY_SHARE = 0.1  # of its reach: way before a search is worth repeating
 AGREED_STEPS = 2.0  # two closures from far off may contradict one another by so much
 URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
 
@@ -40,7 +42,7 @@ class LoopSettings:
         0.7, "share of the scan that must lie on the old submap", minimum=0.0, maximum=1.0
     )
     max_rms: float = setting(0.5, "of the inliers' residuals [finest knot steps]", minimum=0.0)
-    max_reach: float = setting(200.0, "widest search, half width [finest knot steps]", minimum=0.0)
+    max_reach: float = setting(1000.0, "widest search, half width [finest knot steps]", minimum=0.0)
     deviations: float = setting(
         3.0, "a search reaches so many deviations of the graph's uncertainty", minimum=0.0
     )
@@ -135,7 +137,9 @@ class LoopCloser:
         settings = self.local.settings
         unit = settings.ladder[-1]
         self.tried += 1
-        self._next_try[submap.index] = self._travelled_m + settings.loops.retry * unit
+        # the wider the search, the more submaps wait for theirs, and the longer a loop may take
+        again_m = max(settings.loops.retry * unit, RETRY_SHARE * reach_m)
+        self._next_try[submap.index] = self._travelled_m + again_m
         guess = (self.graph.pose(submap.index).inverse() @ self._pose_map(keyframe)).as_array()
         far = reach_m > DIRECT_STEPS * unit
         if far:
@@ -143,7 +147,7 @@ class LoopCloser:
             self._keep_drawn(submap)
             coarse = clusters[max(0, len(clusters) - 2)]
             window = Window(guess, reach_m, reach_rad)
-            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=0.4)
+            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=LEAST_SCORE)
             if peak is None:
                 return
             rival = search(
@@ -222,6 +226,7 @@ class LoopCloser:
         if _position_deviation(loop.information) > AGREED_STEPS * unit:
             return
         wanted = self.graph.pose(loop.submap) @ loop.pose_submap_base
+        view_m = median_range(keyframe.clusters.points)
         for other, other_wanted in self._doubtful:
             if other.keyframe == loop.keyframe:
                 continue
@@ -233,7 +238,7 @@ class LoopCloser:
             if (
                 math.hypot(gap.x, gap.y) < AGREED_STEPS * unit + 0.05 * way
                 and abs(gap.theta) < math.radians(3.0)
-                and median_range(keyframe.clusters.points) <= way < 100.0 * unit
+                and view_m <= way < max(100.0 * unit, 3.0 * view_m)
             ):
                 self._doubtful.remove((other, other_wanted))
                 self._accept(other)

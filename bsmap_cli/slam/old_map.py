@@ -93,7 +93,10 @@ class OldMap:
         """
         way_m = np.abs(self._finder.way_m[stretch.start : stretch.stop, None] - known_m[None, :])
         coasted_m = sum(self._local.keyframes[k].coasted_m for k in stretch)
-        metres, radians = way_deviation(float(way_m.min()), self._unit, coasted_m=coasted_m)
+        coasted_rad = sum(self._local.keyframes[k].coasted_rad for k in stretch)
+        metres, radians = way_deviation(
+            float(way_m.min()), self._unit, coasted_m=coasted_m, coasted_rad=coasted_rad
+        )
         loops = self._settings.loops
         widest_m = loops.max_reach * self._unit
         return min(loops.deviations * metres, widest_m), loops.deviations * radians

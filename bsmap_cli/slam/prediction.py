@@ -15,7 +15,8 @@ MEMORY = 0.05  # share of the newest surprise
 CRUISE = 0.25  # share of the newest step in the velocity that is kept where walls say nothing
 LONGEST_S = 0.5  # no robot gathers speed for longer
 FOLLOWING = 0.6  # of a match's deviation is in the step to it: two in a row err alike
-ODOMETRY_DRIFT = 0.1  # of the way: what raw odometry slips at its worst
+ODOMETRY_DRIFT = 0.1  # of the way and of the turn: what raw odometry slips at its worst
+ODOMETRY_TURN = 0.001  # and turns on a straight way [rad per finest knot step]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +55,8 @@ class Prediction(NamedTuple):
     """`step` is the motion in the body frame since the last scan.
 
     sigma_m, sigma_rad : how far the true step may be off. drift_m : what a step adds to the error
-    of the way where nothing but this prediction is known. by_odometry : wheels say so, and not
+    of the way where nothing but this prediction is known, drift_rad : to that of the heading.
+    by_odometry : wheels say so, and not
     the motion so far.
     """
 
@@ -62,6 +64,7 @@ class Prediction(NamedTuple):
     sigma_m: float
     sigma_rad: float
     drift_m: float
+    drift_rad: float
     by_odometry: bool
 
     def information(self) -> Points:
@@ -97,6 +100,7 @@ class Predictor:
                 settings.odometry_sigma * self.unit_m + way,
                 math.radians(settings.odometry_sigma_deg) + abs(step.theta),
                 ODOMETRY_DRIFT * way,
+                ODOMETRY_DRIFT * abs(step.theta) + ODOMETRY_TURN * way / self.unit_m,
                 True,
             )
         square_s2 = min(elapsed_s, LONGEST_S) ** 2
@@ -104,7 +108,7 @@ class Predictor:
         started_m = settings.acceleration_m_s2 * square_s2
         sigma_m = max(settings.motion_margin * self._spread_m, math.hypot(started_m, self._vague_m))
         sigma_rad = max(settings.motion_margin * self._spread_rad, started_rad)
-        return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, False)
+        return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, sigma_rad, False)
 
     def observe(
         self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool, sigma_m: float = 0.0

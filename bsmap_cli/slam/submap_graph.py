@@ -19,11 +19,11 @@ STILL_STEPS = 0.02  # finest knot steps: a solution that still moves by less has
 
 @kernel
 def surest_chains(
-    source: int, links: Vector, first: Integers, second: Integers, match: float
+    source: int, links: Vector, first: Integers, second: Integers, matches: Vector
 ) -> Vector:
-    """(n,) least sum of deviations on the way from node `source` to every node.
+    """(n,) least sum of variances on the way from node `source` to every node.
 
-    links : (n - 1,) between neighbours; first, second : the nodes of edges that add `match`.
+    links : (n - 1,) between neighbours; matches : of the edges between nodes `first` and `second`.
     """
     found = np.full(len(links) + 1, math.inf)
     found[source] = 0.0
@@ -36,9 +36,9 @@ def surest_chains(
         changed = False
         for e in range(len(first)):
             i, j = first[e], second[e]
-            if found[i] > found[j] + match or found[j] > found[i] + match:
-                found[i] = min(found[i], found[j] + match)
-                found[j] = min(found[j], found[i] + match)
+            if found[i] > found[j] + matches[e] or found[j] > found[i] + matches[e]:
+                found[i] = min(found[i], found[j] + matches[e])
+                found[j] = min(found[j], found[i] + matches[e])
                 changed = True
     return found
 
@@ -111,14 +111,27 @@ class SubmapGraph:
         return self._chains[0], self._chains[1]
 
     def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
+        """Errors of the links are independent, so their squares add up.
+
+        An error of the angle moves what lies behind it by as much as it is far away: for a place
+        near the one asked from, by the way from there to the link.
+        """
         edges = self._edges.columns
+        first, second = edges.first[edges.loops], edges.second[edges.loops]
         links = np.array(self._links).reshape(-1, 2)
-        match = way_deviation(0.0, self._local.settings.ladder[-1])
-        loops = edges.first[edges.loops], edges.second[edges.loops]
-        metres, radians = (
-            surest_chains(submap, links[:, k].copy(), *loops, match[k]) for k in range(2)
+        match_m, match_rad = way_deviation(0.0, self._local.settings.ladder[-1])
+        levers_m = np.hypot(*(self.poses[:, :2] - self.poses[submap, :2]).T)
+        metres = surest_chains(
+            submap,
+            links[:, 0] ** 2 + (links[:, 1] * levers_m[1:]) ** 2,
+            first,
+            second,
+            match_m**2 + (match_rad * levers_m[second]) ** 2,
         )
-        return metres, radians
+        radians = surest_chains(
+            submap, links[:, 1] ** 2, first, second, np.full(len(first), match_rad**2)
+        )
+        return np.sqrt(metres), np.sqrt(radians)
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
@@ -127,13 +140,14 @@ class SubmapGraph:
         # one begun with the last keyframe stays empty where tracking is lost next
         begin = before[0] if before else behind[0] - 1
         end = behind[0] + 1 if behind else before[-1] + 1
-        way = coasted = 0.0
+        way = coasted_m = coasted_rad = 0.0
         weak = False
         for index in range(begin + 1, min(end, len(local.keyframes))):
             frame = local.keyframes[index]
             step = frame.pose_local.relative_to(local.keyframes[index - 1].pose_local)
             way += math.hypot(step.x, step.y)
-            coasted += frame.coasted_m
+            coasted_m += frame.coasted_m
+            coasted_rad += frame.coasted_rad
             weak = weak or frame.weak
         unit = local.settings.ladder[-1]
-        return way_deviation(way, unit, coasted_m=coasted, weak=weak)
+        return way_deviation(way, unit, coasted_m=coasted_m, coasted_rad=coasted_rad, weak=weak)

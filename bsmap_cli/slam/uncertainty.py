@@ -25,11 +25,19 @@ def match_information(hessian: Points, knot_step_m: float) -> Points:
 
 
 def way_deviation(
-    way_m: float, knot_step_m: float, *, coasted_m: float = 0.0, weak: bool = False
+    way_m: float,
+    knot_step_m: float,
+    *,
+    coasted_m: float = 0.0,
+    coasted_rad: float = 0.0,
+    weak: bool = False,
 ) -> tuple[float, float]:
-    """Deviation [m], [rad] that tracking gathers along a way; `coasted_m` of it without walls."""
+    """Deviation [m], [rad] that tracking gathers along a way.
+
+    coasted_m, coasted_rad : what is to be added where no wall told. weak : the map was lost.
+    """
     metres = FLOOR_STEPS * knot_step_m + DRIFT_SHARE * way_m + coasted_m
-    radians = FLOOR_RAD + DRIFT_RAD_PER_STEP * way_m / knot_step_m
+    radians = FLOOR_RAD + DRIFT_RAD_PER_STEP * way_m / knot_step_m + coasted_rad
     if weak:
         metres, radians = metres + WEAK_STEPS * knot_step_m, radians + WEAK_RAD
     return metres, radians
