@@ -1,12 +1,11 @@
 """Whether work and memory stay flat along a long log.
 
-python benchmarks/long_log.py LOG --scans N [--odom none] [--truth FILE] [--set KEY=VALUE]...
+python benchmarks/long_log.py [--laps 1] [--lidar lms200] [--rate HZ] [--set KEY=VALUE]...
 
-A row for each tenth of the N scans: processor seconds of reading, tracking and the search for
-loops together, and keyframes, submaps and memory by then; at the end the last tenth against the
-first, and with a truth the error of the trajectory. A log of 2 km and 20,138 scans:
-
-bsmap sim campus --lidar lms200 -o campus.mcap --truth campus.truth.tum
+The log is made for it: so many times round the `campus` scene, 2 km each. A row for each tenth
+of the scans: processor seconds of reading, tracking and the search for loops together, and
+keyframes, submaps and memory by then; at the end the last tenth against the first, and the error
+of the trajectory.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from __future__ import annotations
 import argparse
 import resource
 import sys
+import tempfile
 from pathlib import Path
 from time import process_time
 
@@ -22,12 +22,14 @@ from judging import trajectory_figure
 from measured_run import WARM_UP, measured
 
 from bsmap_cli.config import load_settings
-from bsmap_cli.exchange.tum import read_tum
+from bsmap_cli.exchange.log_writers import write_log
 from bsmap_cli.logs.open_log import open_log
 from bsmap_cli.logs.reader import ReadOptions
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.pipeline import run_slam
 from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.simulator.scenes.outdoors import campus
+from bsmap_cli.sensor.simulator.simulation import simulate
 from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.slam import Slam
 
@@ -68,27 +70,31 @@ class Tenths:
 
 
 def main() -> None:
-    """Run once over a log."""
+    """Make a log and run once over it."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("log", type=Path)
-    parser.add_argument("--scans", type=int, required=True, help="how many the log holds")
+    parser.add_argument("--laps", type=int, default=1)
+    parser.add_argument("--lidar", default="lms200")
+    parser.add_argument("--rate", type=float, help="scans a second, instead of the lidar's own")
     parser.add_argument("--odom", default="auto")
-    parser.add_argument("--truth", type=Path, metavar="FILE", help="true poses (TUM)")
     parser.add_argument("--set", action="append", default=[])
     arguments = parser.parse_args()
     settings = load_settings(overrides=arguments.set)
-    measured(WARM_UP, settings, "auto")  # compiles, or loads what is compiled
-    tenths = Tenths(arguments.scans)
-    with open_log([arguments.log], ReadOptions(odom=arguments.odom)) as reader:
-        run = run_slam(reader, settings, onlooker=tenths)
-    figures = {name: run.figures[name] for name in ("loops", "loops_tried", "loops_rejected")}
+    simulation = simulate(campus(arguments.laps), lidar=arguments.lidar, rate_hz=arguments.rate)
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.mcap"
+        with log.open("wb") as stream:
+            write_log(stream, simulation.scans(), "mcap")
+        measured(WARM_UP, settings, "auto")  # compiles, or loads what is compiled
+        tenths = Tenths(len(simulation))
+        with open_log([log], ReadOptions(odom=arguments.odom)) as reader:
+            run = run_slam(reader, settings, onlooker=tenths)
+    names = ("travelled_m", "loops", "loops_tried", "loops_rejected")
     lost = sum(stretch["scans"] for stretch in run.figures["tracking_lost"])
     print(
-        f"last tenth / first: {tenths.seconds[-1] / tenths.seconds[0]:.2f}, {figures}, lost {lost}"
+        f"last tenth / first: {tenths.seconds[-1] / tenths.seconds[0]:.2f},"
+        f" { ({name: run.figures[name] for name in names}) }, lost {lost}"
     )
-    if arguments.truth:
-        with arguments.truth.open(encoding="utf-8") as stream:
-            print(f"error {trajectory_figure(run.trajectory, read_tum(stream)):.3f} m (ATE)")
+    print(f"error {trajectory_figure(run.trajectory, simulation.truth):.3f} m (ATE)")
 
 
 if __name__ == "__main__":

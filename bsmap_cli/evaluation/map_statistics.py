@@ -10,7 +10,8 @@ import numpy as np
 
 from bsmap_cli.evaluation.occupancy import MOST_CELLS, grid_frame, occupancy, trinary_png
 from bsmap_cli.evaluation.redundancy import SAMPLES_PER_STEP, redundancy
-from bsmap_cli.mapping.map_document import LevelSamples, MapDocument
+from bsmap_cli.geometry.se2 import Points
+from bsmap_cli.mapping.map_document import LevelSamples, MapDocument, MapLevel
 from bsmap_cli.mapping.map_file import MapSizes, write_map
 from bsmap_cli.mapping.sampling import sample_level
 
@@ -64,25 +65,23 @@ def sizes_of(document: MapDocument, *, compress: bool = False) -> MapSizes:
 
 def map_statistics(document: MapDocument, sizes: MapSizes) -> MapStatistics:
     """Count and measure; `sizes` are those of the file, see `read_map_with_sizes`."""
-    samples = [
-        sample_level(level, level.knot_step_m / SAMPLES_PER_STEP) for level in document.levels
-    ]
+    drawn = [_drawn(level) for level in document.levels]
     levels = tuple(
         LevelStatistics(
             knot_step=level.knot_step_m,
             curves=len(level),
             control_points=len(level.weights),
             bytes=level_bytes,
-            length_m=drawn_length(level_samples),
+            length_m=length_m,
         )
-        for level, level_bytes, level_samples in zip(
-            document.levels, sizes.level_bytes, samples, strict=True
+        for level, level_bytes, (length_m, _) in zip(
+            document.levels, sizes.level_bytes, drawn, strict=True
         )
     )
-    finest, points = levels[-1], samples[-1].points
+    finest, corners = levels[-1], drawn[-1][1]
     raw = finest.bytes == 24 * finest.curves + 9 * finest.control_points
     point_bytes = 9 * finest.control_points if raw else finest.bytes
-    grid = grid_frame(points, GRID_M).cells
+    grid = grid_frame(corners, GRID_M).cells
     png = _png_bytes(document) if 0 < grid <= MOST_CELLS else None
     return MapStatistics(
         file_bytes=sizes.file_bytes,
@@ -93,8 +92,8 @@ def map_statistics(document: MapDocument, sizes: MapSizes) -> MapStatistics:
         bytes_per_control_point=_ratio(point_bytes, finest.control_points),
         degree=document.degree,
         length_m=finest.length_m,
-        bounds_m=_bounds(samples[-1]),
-        redundancy=redundancy(document.finest, samples[-1]),
+        bounds_m=_bounds(corners),
+        redundancy=redundancy(document.finest),
         levels=levels,
         grid_5cm_bytes=grid,
         ratio_to_grid_5cm=_ratio(grid, finest.bytes),
@@ -115,10 +114,21 @@ def _png_bytes(document: MapDocument) -> int:
     return len(trinary_png(grid.cells))
 
 
-def _bounds(samples: LevelSamples) -> tuple[float, float, float, float] | None:
-    if not len(samples.points):
+def _drawn(level: MapLevel) -> tuple[float, Points]:
+    """Length of what is drawn [m], and points that have its bounding box."""
+    length_m, corners = 0.0, [np.zeros((0, 2))]
+    for _, part in level.portions():
+        samples = sample_level(part, level.knot_step_m / SAMPLES_PER_STEP)
+        if len(samples.points):
+            length_m += drawn_length(samples)
+            corners += [samples.points.min(axis=0)[None], samples.points.max(axis=0)[None]]
+    return length_m, np.concatenate(corners)
+
+
+def _bounds(corners: Points) -> tuple[float, float, float, float] | None:
+    if not len(corners):
         return None
-    (x0, y0), (x1, y1) = samples.points.min(axis=0), samples.points.max(axis=0)
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     return float(x0), float(y0), float(x1), float(y1)
 
 

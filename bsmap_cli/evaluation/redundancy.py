@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
+from bsmap_cli.mapping.map_document import PORTION, LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import sample_level
 
 SAMPLES_PER_STEP = 4
@@ -27,19 +28,50 @@ def redundancy(level: MapLevel, samples: LevelSamples | None = None) -> float:
     one more than two knot steps away in tau, passes within half a knot step in a direction within
     30 degrees and has a higher (mean weight there, -curve_id). `samples` saves sampling again.
     """
+    if samples is not None or len(level.weights) <= 2 * PORTION:
+        found, left = _tally(level, samples)
+    else:
+        tallies = [_tally(part, None, tile) for part, tile in _tiles(level)]
+        found, left = (sum(column) for column in zip(*tallies, strict=True))
+    # of two passes one is the heavier: some sample is always left
+    return found / left if found else 1.0
+
+
+def _tally(
+    level: MapLevel, samples: LevelSamples | None, tile: Points | None = None
+) -> tuple[int, int]:
+    """How many samples there are within a tile (its two corners), and how many are uncovered."""
     if samples is None:
         samples = sample_level(level, level.knot_step_m / SAMPLES_PER_STEP)
-    if not len(samples.tau_m):
-        return 1.0
     covered = covered_samples(samples, level.curve_ids.astype(np.int64), level.knot_step_m)
-    # of two passes one is the heavier: some sample is always left
-    return len(covered) / float(np.count_nonzero(~covered))
+    if tile is not None:
+        within = (samples.points >= tile[0]) & (samples.points < tile[1])
+        covered = covered[within.all(axis=1)]
+    return len(covered), int(np.count_nonzero(~covered))
+
+
+def _tiles(level: MapLevel) -> Iterator[tuple[MapLevel, Points]]:
+    """The level in tiles of some control points each, with all curves that may reach into one."""
+    firsts = level.offsets()[:-1]
+    low = np.minimum.reduceat(level.control_points, firsts, axis=0) - level.knot_step_m
+    high = np.maximum.reduceat(level.control_points, firsts, axis=0) + level.knot_step_m
+    side = math.ceil(math.sqrt(len(level.weights) / PORTION))
+    lines = np.linspace(low.min(axis=0), high.max(axis=0), side + 1)
+    for column in range(side):
+        for row in range(side):
+            begin = np.array([lines[column, 0], lines[row, 1]])
+            end = np.array([lines[column + 1, 0], lines[row + 1, 1]])
+            kept = np.asarray(((high >= begin) & (low <= end)).all(axis=1))
+            if kept.any():
+                yield level.only(kept), np.array([begin, end])
 
 
 def covered_samples(
     samples: LevelSamples, curve_ids: NDArray[np.int64], knot_step_m: float
 ) -> NDArray[np.bool_]:
     """(S,) bool: the samples that another, heavier pass of a curve covers."""
+    if not len(samples.tau_m):
+        return np.zeros(0, bool)
     first = np.flatnonzero(np.diff(samples.piece) == 0)  # segments between neighbouring samples
     chord = samples.points[first + 1] - samples.points[first]
     length = np.hypot(chord[:, 0], chord[:, 1])

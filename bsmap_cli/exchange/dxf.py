@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import BinaryIO
 
 import numpy as np
@@ -26,24 +26,34 @@ def write_dxf(stream: BinaryIO, selection: Selection) -> None:
     curve's id.
     """
     layers = [f"curves {selected.level.knot_step_m:g}" for selected in selection.levels]
-    curves = [clamped_pieces(selected) for selected in selection.levels]
     handles = Handles()
-    tags = list(frame_head([*layers, PATH_LAYER], _extent(curves), handles))
-    for layer, selected, level_curves in zip(layers, selection.levels, curves, strict=True):
-        ids = selected.level.curve_ids
-        for curve in level_curves:
-            tags += _spline(curve, layer, selected.level.degree, int(ids[curve.curve]), handles)
-    if len(selection.path) > 1:
-        tags += _polyline(simplified(selection.path[:, :2], TOLERANCE_M), handles)
-    tags += frame_tail(handles)
-    text = "".join(f"{code}\n{value}\n" for code, value in tags)
-    stream.write(text.replace(Handles.SEED_MARK, handles.next(), 1).encode("ascii"))
+    path = selection.path[:, :2] if len(selection.path) > 1 else None
+    head = _text(frame_head([*layers, PATH_LAYER], _extent(selection), handles))
+    entities = sum(len(selected.pieces.curve) for selected in selection.levels)
+    seed = handles.behind(entities + (path is not None))
+    stream.write(head.replace(Handles.SEED_MARK.encode(), seed.encode(), 1))
+    for layer, selected in zip(layers, selection.levels, strict=True):
+        for part in selected.portions():
+            ids, degree = part.level.curve_ids, part.level.degree
+            for curve in clamped_pieces(part):
+                stream.write(_text(_spline(curve, layer, degree, int(ids[curve.curve]), handles)))
+    if path is not None:
+        stream.write(_text(_polyline(simplified(path, TOLERANCE_M), handles)))
+    stream.write(_text(frame_tail(handles)))
 
 
-def _extent(curves: Sequence[Sequence[ClampedCurve]]) -> tuple[Points, Points]:
-    clouds = [curve.control_points for level in curves for curve in level]
-    points = np.concatenate(clouds) if clouds else np.zeros((1, 2))
-    return points.min(axis=0), points.max(axis=0)
+def _text(tags: Iterable[tuple[int, str]]) -> bytes:
+    return "".join(f"{code}\n{value}\n" for code, value in tags).encode("ascii")
+
+
+def _extent(selection: Selection) -> tuple[Points, Points]:
+    corners = []
+    for selected in selection.levels:
+        for part in selected.portions():
+            points = np.concatenate([curve.control_points for curve in clamped_pieces(part)])
+            corners += [points.min(axis=0), points.max(axis=0)]
+    cloud = np.array(corners or [[0.0, 0.0]])
+    return cloud.min(axis=0), cloud.max(axis=0)
 
 
 def _entity(kind: str, layer: str, subclass: str, handles: Handles) -> Tags:

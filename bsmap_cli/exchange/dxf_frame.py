@@ -29,6 +29,10 @@ class Handles:
         self._last += 1
         return f"{self._last:X}"
 
+    def behind(self, count: int) -> str:
+        """The handle that `next` gives once so many more have been given."""
+        return f"{self._last + count + 1:X}"
+
 
 def frame_head(
     layers: Sequence[str], extent: tuple[Points, Points], handles: Handles

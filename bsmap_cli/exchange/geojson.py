@@ -31,12 +31,18 @@ def write_geojson(
     document: dict[str, Any] = {"type": "FeatureCollection"}
     if origin is None:
         document["bsmap:frame"] = selection.frame
-    document["features"] = [
-        feature
-        for selected in selection.levels
-        for feature in _features(selected, origin, tolerance_m)
-    ]
-    stream.write(json.dumps(document, separators=(",", ":"), allow_nan=False).encode() + b"\n")
+    stream.write(_dump(document)[:-1] + b',"features":[')
+    separator = b""
+    for selected in selection.levels:
+        for part in selected.portions():
+            features = _features(part, origin, tolerance_m)
+            stream.write(separator + b",".join(_dump(feature) for feature in features))
+            separator = b","
+    stream.write(b"]}\n")
+
+
+def _dump(value: dict[str, Any]) -> bytes:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()
 
 
 def _features(
@@ -45,12 +51,11 @@ def _features(
     level, features = selected.level, []
     lines = polylines(selected, tolerance_m)
     rows = level.offsets()
-    for curve in np.unique(selected.pieces.curve).tolist():
-        own = [lines[k] for k in np.flatnonzero(selected.pieces.curve == curve)]
-        coordinates = [_coordinates(line, origin) for line in own]
+    for curve, own in selected.by_curve():
+        coordinates = [_coordinates(line, origin) for line in lines[own]]
         geometry = {
-            "type": "LineString" if len(own) == 1 else "MultiLineString",
-            "coordinates": coordinates[0] if len(own) == 1 else coordinates,
+            "type": "LineString" if len(coordinates) == 1 else "MultiLineString",
+            "coordinates": coordinates[0] if len(coordinates) == 1 else coordinates,
         }
         weights = level.weights[rows[curve] : rows[curve + 1]].astype(float)
         properties = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -17,12 +18,17 @@ FORMAT, VERSION = "bsmap", 1
 
 def write_map_json(stream: BinaryIO, document: MapDocument) -> None:
     """Write the document of `document_to_json`, a line for each curve."""
-    head, levels = document_to_json(document), []
-    for level in head.pop("levels"):
-        curves = ",\n".join(_dump(curve) for curve in level["curves"])
-        levels.append(f'{{"knot_step_m":{level["knot_step_m"]!r},"curves":[\n{curves}]}}')
-    text = _dump(head)[:-1] + ',"levels":[\n' + ",\n".join(levels) + "]}\n"
-    stream.write(text.encode())
+    head = document_to_json(replace(document, levels=()))
+    del head["levels"]
+    stream.write(f'{_dump(head)[:-1]},"levels":[\n'.encode())
+    for number, level in enumerate(document.levels):
+        comma = ",\n" if number else ""
+        stream.write(f'{comma}{{"knot_step_m":{level.knot_step_m!r},"curves":[\n'.encode())
+        for first, part in level.portions():
+            curves = ",\n".join(_dump(curve) for curve in _curves(part))
+            stream.write(((",\n" if first else "") + curves).encode())
+        stream.write(b"]}")
+    stream.write(b"]}\n")
 
 
 def read_map_json(stream: BinaryIO) -> MapDocument:

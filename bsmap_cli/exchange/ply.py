@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bsmap_cli.exchange.selection import Selection
-from bsmap_cli.mapping.sampling import sample_pieces
+from bsmap_cli.exchange.selection import SelectedLevel, Selection
+from bsmap_cli.mapping.sampling import sample_counts, sample_pieces
 
 SAMPLES_PER_STEP = 4
 FIELDS = (
@@ -23,20 +24,26 @@ def write_ply(stream: BinaryIO, selection: Selection) -> None:
 
     Normals point to the free side; z is 0.
     """
-    parts = []
-    for selected in selection.levels:
-        level = selected.level
-        samples = sample_pieces(level, selected.pieces, level.knot_step_m / SAMPLES_PER_STEP)
-        vertices = np.zeros(len(samples.points), VERTEX)
-        vertices["x"], vertices["y"] = samples.points.T
-        vertices["nx"], vertices["ny"] = -samples.tangents[:, 1], samples.tangents[:, 0]
-        vertices["weight"] = samples.weight
-        vertices["curve_id"] = level.curve_ids[samples.curve]
-        parts.append(vertices)
-    vertices = np.concatenate(parts)
+    steps = [selected.level.knot_step_m / SAMPLES_PER_STEP for selected in selection.levels]
+    count = sum(
+        int(sample_counts(selected.level, selected.pieces, step_m).sum())
+        for selected, step_m in zip(selection.levels, steps, strict=True)
+    )
     properties = "".join(f"property {kind} {name}\n" for name, _, kind in FIELDS)
     stream.write(
         "ply\nformat binary_little_endian 1.0\ncomment metres of the map's frame\n"
-        f"element vertex {len(vertices)}\n{properties}end_header\n".encode("ascii")
+        f"element vertex {count}\n{properties}end_header\n".encode("ascii")
     )
-    stream.write(vertices.tobytes())
+    for selected, step_m in zip(selection.levels, steps, strict=True):
+        for part in selected.portions():
+            stream.write(_vertices(part, step_m).tobytes())
+
+
+def _vertices(selected: SelectedLevel, step_m: float) -> NDArray[np.void]:
+    samples = sample_pieces(selected.level, selected.pieces, step_m)
+    vertices = np.zeros(len(samples.points), VERTEX)
+    vertices["x"], vertices["y"] = samples.points.T
+    vertices["nx"], vertices["ny"] = -samples.tangents[:, 1], samples.tangents[:, 0]
+    vertices["weight"] = samples.weight
+    vertices["curve_id"] = selected.level.curve_ids[samples.curve]
+    return vertices

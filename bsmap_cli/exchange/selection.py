@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,24 @@ class SelectedLevel:
 
     level: MapLevel
     pieces: DrawnPieces
+
+    def portions(self) -> Iterator[SelectedLevel]:
+        """The same, some curves at a time: see `MapLevel.portions`."""
+        pieces = self.pieces
+        for first, part in self.level.portions():
+            begin, end = np.searchsorted(pieces.curve, (first, first + len(part))).tolist()
+            if begin < end:
+                curve = pieces.curve[begin:end] - first
+                yield SelectedLevel(
+                    part, DrawnPieces(curve, pieces.start[begin:end], pieces.end[begin:end])
+                )
+
+    def by_curve(self) -> Iterator[tuple[int, slice]]:
+        """Each curve of which something is drawn, and which of the pieces are its."""
+        curves, firsts = np.unique(self.pieces.curve, return_index=True)
+        ends = [*firsts[1:].tolist(), len(self.pieces.curve)]
+        for curve, begin, end in zip(curves.tolist(), firsts.tolist(), ends, strict=True):
+            yield curve, slice(begin, end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,24 +100,8 @@ def selected_document(selection: Selection) -> MapDocument:
         if selection.clip is not None:
             kept[:] = False
             kept[selected.pieces.curve] = True
-        levels.append(_with_curves(selected.level, kept))
+        levels.append(selected.level.only(kept))
     return replace(selection.document, levels=tuple(levels))
-
-
-def _with_curves(level: MapLevel, kept: NDArray[np.bool_]) -> MapLevel:
-    points = np.repeat(kept, level.point_counts)
-    return replace(
-        level,
-        curve_ids=level.curve_ids[kept],
-        tau_start_m=level.tau_start_m[kept],
-        tau_end_m=level.tau_end_m[kept],
-        flags=level.flags[kept],
-        observations=level.observations[kept],
-        first_indices=level.first_indices[kept],
-        point_counts=level.point_counts[kept],
-        control_points=level.control_points[points],
-        weights=level.weights[points],
-    )
 
 
 def clipped(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:

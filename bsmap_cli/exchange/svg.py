@@ -31,9 +31,7 @@ def write_svg(stream: BinaryIO, selection: Selection) -> None:
     one path `curve-ID` (`level-STEP-curve-ID` where there are several levels) of the class
     `weight-1` to `weight-5`; its weight, its tau and its flags stand in `data-` attributes.
     """
-    beziers = [bezier_pieces(selected) for selected in selection.levels]
-    box = _bounds([segments.reshape(-1, 2) for level in beziers for segments in level])
-    x0, y0, x1, y1 = box
+    x0, y0, x1, y1 = _bounds(selection)
     side = max(x1 - x0, y1 - y0)
     scale = 1.0 / round_length(PAPER_MM / 1000.0 / side)
     millimetres = [f"{1000.0 * length / scale:.6g}mm" for length in (x1 - x0, y1 - y0)]
@@ -52,11 +50,14 @@ def write_svg(stream: BinaryIO, selection: Selection) -> None:
         '<g id="map" transform="scale(1 -1)" fill="none">',  # for programs that read no styles
     ]
     several = len(selection.levels) > 1
-    for selected, level_beziers in zip(selection.levels, beziers, strict=True):
+    for selected in selection.levels:
         step = f"level-{selected.level.knot_step_m:g}"
         lines.append(f'<g id="{step}">')
         prefix = f"{step}-" if several else ""
-        lines += _curves(selected, level_beziers, prefix, selection.document.max_weight)
+        for part in selected.portions():
+            lines += _curves(part, prefix, selection.document.max_weight)
+            stream.write("\n".join([*lines, ""]).encode())
+            lines = []
         lines.append("</g>")
     if len(selection.path):
         lines.append(f'<path id="path" d="{_polyline(selection.path[:, :2])}"/>')
@@ -64,18 +65,15 @@ def write_svg(stream: BinaryIO, selection: Selection) -> None:
     stream.write("\n".join(lines).encode())
 
 
-def _curves(
-    selected: SelectedLevel, beziers: list[NDArray[np.float64]], prefix: str, max_weight: int
-) -> list[str]:
-    level = selected.level
+def _curves(selected: SelectedLevel, prefix: str, max_weight: int) -> list[str]:
+    level, beziers = selected.level, bezier_pieces(selected)
     rows = level.offsets()
     lines = []
-    for curve in np.unique(selected.pieces.curve).tolist():
-        own = np.flatnonzero(selected.pieces.curve == curve).tolist()
+    for curve, own in selected.by_curve():
         weights = level.weights[rows[curve] : rows[curve + 1]].astype(float)
         weight = float(weights[weights > 0].mean())
         kind = min(int(weight / max(max_weight, 1) * WEIGHT_CLASSES), WEIGHT_CLASSES - 1) + 1
-        shape = " ".join(_bezier_path(beziers[k]) for k in own)
+        shape = " ".join(_bezier_path(segments) for segments in beziers[own])
         lines.append(
             f'<path id="{prefix}curve-{level.curve_ids[curve]}" class="weight-{kind}"'
             f' data-weight="{weight:.3g}" data-tau="{level.tau_start_m[curve]!s}'
@@ -86,17 +84,16 @@ def _curves(
 
 def _bezier_path(segments: NDArray[np.float64]) -> str:
     letter = "C" if segments.shape[1] == 4 else "Q"
-    rest = " ".join(_point(point) for segment in segments for point in segment[1:])
-    return f"M{_point(segments[0, 0])} {letter}{rest}"
+    first, *rest = _points(np.concatenate((segments[:1, 0], segments[:, 1:].reshape(-1, 2))))
+    return f"M{first} {letter}{' '.join(rest)}"
 
 
 def _polyline(points: Points) -> str:
-    kept = simplified(points, PATH_TOLERANCE_M)
-    return "M" + " ".join(_point(point) for point in kept)
+    return "M" + " ".join(_points(simplified(points, PATH_TOLERANCE_M)))
 
 
-def _point(point: NDArray[np.float64]) -> str:
-    return f"{_number(point[0])},{_number(point[1])}"
+def _points(points: Points) -> list[str]:
+    return [f"{_number(x)},{_number(y)}" for x, y in points.tolist()]
 
 
 def _number(value: float) -> str:
@@ -104,8 +101,13 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _bounds(clouds: list[Points]) -> tuple[float, float, float, float]:
-    points = np.concatenate(clouds) if clouds else np.array([[-1.0, -1.0], [1.0, 1.0]])
+def _bounds(selection: Selection) -> tuple[float, float, float, float]:
+    corners = []
+    for selected in selection.levels:
+        for part in selected.portions():
+            hull = np.concatenate(bezier_pieces(part)).reshape(-1, 2)
+            corners += [hull.min(axis=0), hull.max(axis=0)]
+    points = np.array(corners or [[-1.0, -1.0], [1.0, 1.0]])
     (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     margin = max(MARGIN * max(x1 - x0, y1 - y0), 0.01)
     return x0 - margin, y0 - margin, x1 + margin, y1 + margin

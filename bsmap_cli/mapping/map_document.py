@@ -15,6 +15,7 @@ from bsmap_cli.geometry.se2 import SE2, Points, Vector
 
 CLOSED = 1  # flag bit 0: the curve's end meets its start
 TENTATIVE = 2  # flag bit 1: seen from too few viewpoints to be trusted
+PORTION = 500_000  # control points that are worked on at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +62,36 @@ class MapLevel:
             tau_start_m=start_m + float(self.tau_start_m[index]),
             tau_end_m=start_m + float(self.tau_end_m[index]),
         )
+
+    def only(self, kept: NDArray[np.bool_]) -> MapLevel:
+        """Without the curves that are not kept; kept : (K,)."""
+        rows = np.repeat(kept, self.point_counts)
+        return replace(
+            self,
+            curve_ids=self.curve_ids[kept],
+            tau_start_m=self.tau_start_m[kept],
+            tau_end_m=self.tau_end_m[kept],
+            flags=self.flags[kept],
+            observations=self.observations[kept],
+            first_indices=self.first_indices[kept],
+            point_counts=self.point_counts[kept],
+            control_points=self.control_points[rows],
+            weights=self.weights[rows],
+        )
+
+    def portions(self, most: int = PORTION) -> Iterator[tuple[int, MapLevel]]:
+        """The curves in order, so many control points or one curve at a time; first curve of each.
+
+        What goes over a large map in portions does not hold all that it makes of it at once.
+        """
+        ends = np.cumsum(self.point_counts)
+        first = done = 0
+        while first < len(self):
+            last = max(first + 1, int(np.searchsorted(ends, done + most, side="right")))
+            kept = np.zeros(len(self), bool)
+            kept[first:last] = True
+            yield first, self.only(kept)
+            first, done = last, int(ends[last - 1])
 
     def moved(self, pose_new_old: SE2) -> MapLevel:
         """The same curves in another frame."""

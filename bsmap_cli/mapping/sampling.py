@@ -86,11 +86,17 @@ def sample_level(level: MapLevel, step_m: float) -> LevelSamples:
     return sample_pieces(level, drawn_pieces(level), step_m)
 
 
-def sample_pieces(level: MapLevel, pieces: DrawnPieces, step_m: float) -> LevelSamples:
-    """The same for some pieces of the level's curves."""
+def sample_counts(level: MapLevel, pieces: DrawnPieces, step_m: float) -> NDArray[np.int64]:
+    """(P,) how many samples `sample_pieces` takes of each piece."""
     length = pieces.end - pieces.start
     intervals = np.maximum(np.ceil(length * (level.knot_step_m / step_m) - SLIVER), 1)
-    counts = intervals.astype(np.int64) + 1
+    return np.asarray(intervals.astype(np.int64) + 1)
+
+
+def sample_pieces(level: MapLevel, pieces: DrawnPieces, step_m: float) -> LevelSamples:
+    """The same for some pieces of the level's curves."""
+    counts = sample_counts(level, pieces, step_m)
+    intervals = (counts - 1).astype(np.float64)
     piece = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = number / intervals[piece]

@@ -190,6 +190,17 @@ def test_a_loop_of_two_kilometres_closes():
     assert campus.end.metres <= FINEST_M
 
 
+@LONG
+def test_a_loop_of_two_kilometres_closes_where_one_scan_in_twenty_shows_nothing_near():
+    """What a beam a degree sees of walls 20 m away no submap holds: odometry alone tells the way
+    there, and the loop closes over all that it slips."""
+    campus = drive("campus", "lms200", seed=0)
+    campus.assert_no_wrong_closure()
+    assert off_m(campus.odometry, campus.truth) > 50.0 * FINEST_M
+    assert campus.result.figures["loops"] >= 20
+    assert campus.end.metres <= 3.0 * FINEST_M
+
+
 @pytest.mark.parametrize("scene", ["loop", "office"])
 def test_a_laser_ahead_of_the_base_gives_the_way_of_the_base(scene):
     ahead = drive(scene, rate_hz=5.0, pose_base_laser=AHEAD)

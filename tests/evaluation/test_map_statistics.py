@@ -57,6 +57,19 @@ def test_redundancy_beside_the_naive_one(seed):
     assert redundancy(level) == pytest.approx(naive_redundancy(level))
 
 
+def test_redundancy_in_tiles_is_that_of_the_whole(monkeypatch):
+    rng = np.random.default_rng(3)
+    curves = []
+    for _ in range(60):
+        start = rng.uniform(-3.0, 3.0, 2)
+        curves.append(line_points(start, start + rng.uniform(0.4, 4.0, 2), 0.1))
+    level = make_level(curves, weights=rng.integers(1, 4, sum(map(len, curves))))
+    whole = redundancy(level)
+    assert whole > 1.01
+    monkeypatch.setattr("bsmap_cli.evaluation.redundancy.PORTION", 100)
+    assert redundancy(level) == pytest.approx(whole, abs=1e-12)
+
+
 LINE = line_points((0, 0), (4, 0), 0.1)
 
 

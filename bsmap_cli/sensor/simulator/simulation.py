@@ -87,7 +87,7 @@ class Simulation:
 
 
 def simulate(
-    scene: str,
+    scene: str | Scene,
     *,
     lidar: str = "ust10lx",
     noise_m: float | None = None,
@@ -106,7 +106,7 @@ def simulate(
 
     Parameters
     ----------
-    scene, lidar : names in `SCENES` and `LIDARS`.
+    scene, lidar : names in `SCENES` and `LIDARS`; or a scene that is none of them.
     noise_m : standard deviation of a range [m]; None for the lidar's own. 0 means exact ranges.
     seed : of everything random; the scene itself does not depend on it.
     odometry : whether the scans carry odometry.
@@ -130,7 +130,7 @@ def simulate(
         dropout_share=dropout_share,
         resolution_m=resolution_m,
     )
-    plan = _scene(scene)
+    plan = _scene(scene) if isinstance(scene, str) else scene
     model = _model(
         lidar,
         range_sigma_m=noise_m,
@@ -154,7 +154,7 @@ def simulate(
         wheels = None if wheels is None else wheels[kept]
     poses[:, 2] = 0.0 - ((math.pi - poses[:, 2]) % math.tau - math.pi)  # (-pi, pi]
     return Simulation(
-        scene=scene,
+        scene=scene if isinstance(scene, str) else "",
         lidar=model,
         world=plan.world,
         motion=motion,

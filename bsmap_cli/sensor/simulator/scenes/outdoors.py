@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2, Points
-from bsmap_cli.sensor.simulator.motion import MotionLimits, Route
+from bsmap_cli.sensor.simulator.motion import Motion, MotionLimits, Route
 from bsmap_cli.sensor.simulator.scenes.scene import Scene
 from bsmap_cli.sensor.simulator.scenes.walls import Niche, wall
 from bsmap_cli.sensor.simulator.world import Shapes, World, box, circle, gather, polyline
@@ -77,10 +77,15 @@ def _keeps_clear(shapes: Shapes, road: Points) -> bool:
     return bool(min(gaps.min(initial=np.inf), to_arcs.min(initial=np.inf)) > CLEARANCE_M)
 
 
-def campus() -> Scene:
-    """2 km round a campus with the last 80 m on the first ones again."""
+def _round(laps: int) -> Motion:
     limits = MotionLimits(speed_m_s=1.0, bend_radius_m=6.0, turn_rate_rad_s=0.5)
-    motion = Route(SE2(0.0, 0.0, math.atan2(20.0, 450.0)), limits).drive(*_WAYPOINTS).motion()
+    waypoints = _WAYPOINTS[:-1] * laps + _WAYPOINTS[-1:]
+    return Route(SE2(0.0, 0.0, math.atan2(20.0, 450.0)), limits).drive(*waypoints).motion()
+
+
+def campus(laps: int = 1) -> Scene:
+    """2 km round a campus, so many times, with the last 80 m on the first ones again."""
+    motion = _round(1)
     road = motion.poses(np.arange(0.0, motion.duration_s, 1.0))
     random = np.random.default_rng(2016)
     parts = []
@@ -97,4 +102,4 @@ def campus() -> Scene:
             if _keeps_clear(shapes, near):
                 parts.append(shapes)
             at_s += float(random.uniform(5.0, 22.0))
-    return Scene(World(gather(parts)), motion)
+    return Scene(World(gather(parts)), _round(laps))
