@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
@@ -14,13 +15,14 @@ from bsmap_cli.errors import UsageError
 from bsmap_cli.evaluation.visibility import visible_cells
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
-from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, sample_pieces
+from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, evaluate, sample_pieces
 
 Cells = NDArray[np.uint8]
 
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 MARGIN_M = 0.5
 MOST_CELLS = 2**27
+ROOMY = 0.9  # of that: bends reach a little beyond the ends of curves
 SAMPLES_AT_ONCE = 1_000_000
 
 
@@ -77,15 +79,13 @@ def occupancy(
     path : (m, 2) positions [m], map frame; a free cell lies between one of them and the free side
     of a curve within `range_max_m`. UsageError where the grid would not fit into memory.
     """
+    least = grid_frame(_ends(levels), resolution_m)  # which costs nothing, and refuses most
+    _refuse_large(least)
     corners = [np.zeros((0, 2))]
     for samples in _sampled(levels, resolution_m):
         corners += [samples.points.min(axis=0)[None], samples.points.max(axis=0)[None]]
     frame = grid_frame(np.concatenate(corners), resolution_m)
-    if frame.cells > MOST_CELLS:
-        raise UsageError(
-            f"a grid of {frame.columns} x {frame.rows} cells is too large:"
-            f" choose cells larger than {resolution_m:g} m"
-        )
+    _refuse_large(frame)
     cells = np.full((frame.rows, frame.columns), UNKNOWN, np.uint8)
     facing = np.zeros((frame.rows, frame.columns), np.uint8)
     for samples in _sampled(levels, resolution_m):
@@ -95,6 +95,33 @@ def occupancy(
         cells[visible_cells(facing, views, range_max_m / resolution_m)] = FREE
     cells[facing != 0] = OCCUPIED
     return Occupancy(frame, cells)
+
+
+def fitting_resolution(levels: Sequence[MapLevel], resolution_m: float) -> float:
+    """The given side of a cell [m], doubled as often as it takes for the grid to be allowed."""
+    ends = _ends(levels)
+    while grid_frame(ends, resolution_m).cells > ROOMY * MOST_CELLS:
+        resolution_m *= 2.0
+    return resolution_m
+
+
+def _ends(levels: Sequence[MapLevel]) -> Points:
+    """Where the drawn pieces of curves begin and end [m]: the grid is no smaller."""
+    points = [np.zeros((0, 2))]
+    for level in levels:
+        pieces = drawn_pieces(level)
+        points += [evaluate(level, pieces.curve, u)[0] for u in (pieces.start, pieces.end)]
+    return np.concatenate(points)
+
+
+def _refuse_large(frame: GridFrame) -> None:
+    if frame.cells > MOST_CELLS:
+        enough_m = frame.resolution_m * math.sqrt(frame.cells / MOST_CELLS)
+        enough_m = math.ceil(20.0 * enough_m) / 20.0
+        raise UsageError(
+            f"a grid of {frame.columns} x {frame.rows} cells is too large: choose cells larger"
+            f" than {frame.resolution_m:g} m, such as --resolution {enough_m:g}"
+        )
 
 
 def _sampled(levels: Sequence[MapLevel], resolution_m: float) -> Iterator[LevelSamples]:

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.evaluation.map_statistics import drawn_length
 from bsmap_cli.evaluation.pose_arrays import nearest_stamps
 from bsmap_cli.exchange.selection import SelectedLevel, Selection
 from bsmap_cli.geometry.basis import basis_matrix
@@ -79,9 +80,9 @@ def _summary(selection: Selection) -> str:
     words = []
     for selected in selection.levels:
         level = selected.level
-        samples = sample_level(level, level.knot_step_m / 2)
-        chords = np.diff(samples.points, axis=0)[np.diff(samples.piece) == 0]
-        metres = float(np.hypot(chords[:, 0], chords[:, 1]).sum())
+        metres = sum(
+            drawn_length(sample_level(part, level.knot_step_m / 2)) for _, part in level.portions()
+        )
         words.append(
             f"{len(level):,} curves, {len(level.weights):,} control points,"
             f" {metres:,.0f} m at knot step {level.knot_step_m:g} m"

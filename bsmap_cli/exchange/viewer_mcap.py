@@ -9,12 +9,12 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.evaluation.occupancy import FREE, OCCUPIED, Occupancy
+from bsmap_cli.evaluation.occupancy import FREE, OCCUPIED, Occupancy, fitting_resolution
 from bsmap_cli.evaluation.pose_arrays import nearest_stamps
 from bsmap_cli.exchange.flatten import TOLERANCE_M
 from bsmap_cli.exchange.line_colours import LINE_PIXELS, coloured_lines
 from bsmap_cli.exchange.mcap_file import McapFile
-from bsmap_cli.exchange.nav2 import selected_occupancy
+from bsmap_cli.exchange.nav2 import RESOLUTION_M, selected_occupancy
 from bsmap_cli.exchange.scan_messages import BASE_FRAME, ScanMessages
 from bsmap_cli.exchange.scene_schema import LINE_STRIP, SCENE_UPDATE, SCENE_UPDATE_SCHEMA
 from bsmap_cli.exchange.selection import SelectedLevel, Selection
@@ -45,7 +45,9 @@ def write_viewer_mcap(
     if len(selection.path):
         file.add_ros("/map/path", "nav_msgs/msg/Path", first_ns, messages.path(selection.path))
     if any(len(selected.pieces.curve) for selected in selection.levels):
-        grid = messages.grid(selected_occupancy(selection))
+        levels = [selected.level for selected in selection.levels]
+        cell_m = fitting_resolution(levels, RESOLUTION_M)
+        grid = messages.grid(selected_occupancy(selection, resolution_m=cell_m))
         file.add_ros("/map/grid", "nav_msgs/msg/OccupancyGrid", first_ns, grid)
     if len(selection.path) and selection.stamps_ns is not None:
         _add_scans(file, messages, selection.path, selection.stamps_ns, scans)

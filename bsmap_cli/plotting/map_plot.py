@@ -37,6 +37,7 @@ WEIGHT_CLASSES = 8
 CURVE_WIDTH_PT, PATH_WIDTH_PT = 1.1, 0.6
 MARKS_PT = (0.8, 5.0)
 SAMPLES_PER_SPAN = 8
+MOST_SAMPLES = 4_000_000
 MATCH_S = 0.1
 
 
@@ -71,7 +72,7 @@ def plot_map(
     levels = document.levels if every_level else document.chosen_levels(level)
     path = document.path[:, :2].astype(float) if trajectory is None else trajectory.poses[:, :2]
     below = overlay.chosen_levels(level) if overlay is not None else ()
-    clouds = [sample_level(each, each.knot_step_m).points for each in (*levels, *below)]
+    clouds = [] if clip else [_corners(each) for each in (*levels, *below)]
     sheet = map_sheet(clip or _bounds([*clouds, path]), theme)
     axes = sheet.axes
     if overlay is not None:
@@ -110,9 +111,24 @@ def _bounds(clouds: list[Points]) -> Bounds:
     return float(x0 - margin), float(y0 - margin), float(x1 + margin), float(y1 + margin)
 
 
+def _corners(level: MapLevel) -> Points:
+    corners = [np.zeros((0, 2))]
+    for _, part in level.portions():
+        points = sample_level(part, level.knot_step_m).points
+        if len(points):
+            corners += [points.min(axis=0)[None], points.max(axis=0)[None]]
+    return np.concatenate(corners)
+
+
+def _spacing_m(level: MapLevel) -> float:
+    """Between samples; in a map so large that a span is less than a pixel, more than a span."""
+    wanted = SAMPLES_PER_SPAN * len(level.weights)
+    return level.knot_step_m / SAMPLES_PER_SPAN * max(1.0, wanted / MOST_SAMPLES)
+
+
 def _polylines(level: MapLevel) -> list[Points]:
     """The drawn pieces as polylines, in the order of `drawn_pieces`."""
-    samples = sample_level(level, level.knot_step_m / SAMPLES_PER_SPAN)
+    samples = sample_level(level, _spacing_m(level))
     if not len(samples.piece):
         return []
     return np.split(samples.points, np.flatnonzero(np.diff(samples.piece)) + 1)
@@ -122,7 +138,7 @@ def _polylines_by_weight(
     level: MapLevel, max_weight: int
 ) -> tuple[list[Points], NDArray[np.int64]]:
     """The same, cut further where the class of the weight changes, and the class of each."""
-    samples = sample_level(level, level.knot_step_m / SAMPLES_PER_SPAN)
+    samples = sample_level(level, _spacing_m(level))
     if not len(samples.piece):
         return [], np.zeros(0, np.int64)
     share = (samples.weight - 1.0) / max(max_weight - 1, 1)

@@ -111,27 +111,30 @@ class SubmapGraph:
         return self._chains[0], self._chains[1]
 
     def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
-        """Errors of the links are independent, so their squares add up.
+        """What is lost along the way may always err to one side, and adds up as it is.
 
-        An error of the angle moves what lies behind it by as much as it is far away: for a place
-        near the one asked from, by the way from there to the link.
+        What no registration goes below errs anew at each link, and its squares add up; so do those
+        of the angles. An error of the angle moves what lies behind it by as much as it is far
+        away: for a place near the one asked from, by the way from there to the link.
         """
         edges = self._edges.columns
         first, second = edges.first[edges.loops], edges.second[edges.loops]
         links = np.array(self._links).reshape(-1, 2)
         match_m, match_rad = way_deviation(0.0, self._local.settings.ladder[-1])
         levers_m = np.hypot(*(self.poses[:, :2] - self.poses[submap, :2]).T)
-        metres = surest_chains(
+        count = len(first)
+        lost_m = surest_chains(submap, links[:, 0] - match_m, first, second, np.zeros(count))
+        squares_m2 = surest_chains(
             submap,
-            links[:, 0] ** 2 + (links[:, 1] * levers_m[1:]) ** 2,
+            match_m**2 + (links[:, 1] * levers_m[1:]) ** 2,
             first,
             second,
             match_m**2 + (match_rad * levers_m[second]) ** 2,
         )
-        radians = surest_chains(
-            submap, links[:, 1] ** 2, first, second, np.full(len(first), match_rad**2)
+        squares_rad2 = surest_chains(
+            submap, links[:, 1] ** 2, first, second, np.full(count, match_rad**2)
         )
-        return np.sqrt(metres), np.sqrt(radians)
+        return lost_m + np.sqrt(squares_m2), np.sqrt(squares_rad2)
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
