@@ -27,8 +27,9 @@ from bsmap_cli.slam.wide_search import search
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
-LEAST_SCORE = 0.5  # of a place worth refining; right ones mostly score 0.7 and more
-RETRY_SHARE = 0.1  # of its reach: way before a search is worth repeating
+WIDE_STEPS = 200.0  # from this reach on deviations count as those of a long way
+LEAST_SCORE, LEAST_WIDE_SCORE = 0.4, 0.5  # of a place worth refining; right ones mostly have 0.7
+RETRY_SHARE = 0.05  # of its reach: way before a search is worth repeating
 AGREED_STEPS = 2.0  # two closures from far off may contradict one another by so much
 URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
 
@@ -106,10 +107,12 @@ class LoopCloser:
         if count == 0:
             return []
         self._remember(count)
-        metres, radians = self.graph.deviations_from(keyframe.submap)
+        metres, radians, far_m = self.graph.deviations_from(keyframe.submap)
         here = self._pose_map(keyframe)
         view_m = median_range(keyframe.clusters.points)
-        reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
+        widest_m = np.maximum(settings.deviations * far_m[:count], WIDE_STEPS * unit)
+        reach_m = np.minimum(settings.deviations * metres[:count], widest_m)
+        reach_m = np.minimum(reach_m, settings.max_reach * unit)
         within = view_m + reach_m
         distances = self._viewpoints.distances(self.graph.poses, here.x, here.y, within)
         found = np.flatnonzero((distances < within) & (self._next_try[:count] <= self._travelled_m))
@@ -147,7 +150,8 @@ class LoopCloser:
             self._keep_drawn(submap)
             coarse = clusters[max(0, len(clusters) - 2)]
             window = Window(guess, reach_m, reach_rad)
-            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=LEAST_SCORE)
+            floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
+            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=floor)
             if peak is None:
                 return
             rival = search(
@@ -236,9 +240,9 @@ class LoopCloser:
             gap = tracked.inverse() @ asked
             way = math.hypot(tracked.x, tracked.y)
             if (
-                math.hypot(gap.x, gap.y) < AGREED_STEPS * unit + 0.05 * way
+                math.hypot(gap.x, gap.y) < AGREED_STEPS * unit + min(0.05 * way, 5.0 * unit)
                 and abs(gap.theta) < math.radians(3.0)
-                and view_m <= way < max(100.0 * unit, 3.0 * view_m)
+                and view_m <= way < max(100.0 * unit, 2.0 * view_m)
             ):
                 self._doubtful.remove((other, other_wanted))
                 self._accept(other)

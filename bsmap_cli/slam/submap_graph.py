@@ -58,7 +58,7 @@ class SubmapGraph:
         self._urgent = False
         self._solved = 0
         self._pending = 0
-        self._chains: tuple[Vector, Vector, int] | None = None
+        self._chains: tuple[int, tuple[Vector, Vector, Vector]] | None = None
 
     def pose(self, submap: int) -> SE2:
         """Where a submap lies in the map frame."""
@@ -104,26 +104,27 @@ class SubmapGraph:
         self._pending += 1
         self._urgent = self._urgent or urgent
 
-    def deviations_from(self, submap: int) -> tuple[Vector, Vector]:
-        """Deviation [m] and [rad] of every submap relative to one, along the surest chain."""
-        if self._chains is None or self._chains[2] != submap:
-            self._chains = (*self._surest_chains(submap), submap)
-        return self._chains[0], self._chains[1]
+    def deviations_from(self, submap: int) -> tuple[Vector, Vector, Vector]:
+        """Deviation [m] and [rad] of every submap relative to one, along the surest chain.
 
-    def _surest_chains(self, submap: int) -> tuple[Vector, Vector]:
-        """What is lost along the way may always err to one side, and adds up as it is.
-
-        What no registration goes below errs anew at each link, and its squares add up; so do those
-        of the angles. An error of the angle moves what lies behind it by as much as it is far
-        away: for a place near the one asked from, by the way from there to the link.
+        The third [m] is what remains of the first over a long way, where what no registration goes
+        below errs anew at each link and adds up by squares, and so do the angles, each times its
+        distance from here; what is lost along the way may always err to one side.
         """
+        if self._chains is None or self._chains[0] != submap:
+            self._chains = (submap, self._surest_chains(submap))
+        return self._chains[1]
+
+    def _surest_chains(self, submap: int) -> tuple[Vector, Vector, Vector]:
         edges = self._edges.columns
         first, second = edges.first[edges.loops], edges.second[edges.loops]
         links = np.array(self._links).reshape(-1, 2)
         match_m, match_rad = way_deviation(0.0, self._local.settings.ladder[-1])
         levers_m = np.hypot(*(self.poses[:, :2] - self.poses[submap, :2]).T)
-        count = len(first)
-        lost_m = surest_chains(submap, links[:, 0] - match_m, first, second, np.zeros(count))
+        matches = np.ones(len(first))
+        metres = surest_chains(submap, links[:, 0].copy(), first, second, match_m * matches)
+        radians = surest_chains(submap, links[:, 1].copy(), first, second, match_rad * matches)
+        lost_m = surest_chains(submap, links[:, 0] - match_m, first, second, 0.0 * matches)
         squares_m2 = surest_chains(
             submap,
             match_m**2 + (links[:, 1] * levers_m[1:]) ** 2,
@@ -131,10 +132,7 @@ class SubmapGraph:
             second,
             match_m**2 + (match_rad * levers_m[second]) ** 2,
         )
-        squares_rad2 = surest_chains(
-            submap, links[:, 1] ** 2, first, second, np.full(count, match_rad**2)
-        )
-        return lost_m + np.sqrt(squares_m2), np.sqrt(squares_rad2)
+        return metres, radians, lost_m + np.sqrt(squares_m2)
 
     def _link_deviation(self, k: int) -> tuple[float, float]:
         """What tracking may have lost between the beginnings of submaps k - 1 and k."""
