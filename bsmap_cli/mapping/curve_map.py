@@ -128,8 +128,7 @@ class CurveMap:
             )
         crowded = 2 * (arrays.sizes[2] + rows) > len(arrays.cell_keys)
         if crowded:
-            need = 4 * (int(arrays.sizes[2]) + rows)
-            cells = 1 << math.ceil(math.log2(need))
+            cells = _cells_for(int(arrays.sizes[2]) + rows)
             arrays = arrays._replace(cell_keys=np.full(cells, EMPTY), cell_heads=np.full(cells, -1))
         self.arrays = arrays
         if crowded:
@@ -137,11 +136,26 @@ class CurveMap:
 
     def trim(self) -> None:
         """Give back the room for control points to come; `reserve` makes it again."""
-        used = int(self.arrays.sizes[1])
-        by_row = ("points", "weights", "owner", "spans", "next_span", "span_cell")
-        self.arrays = self.arrays._replace(
-            **{name: getattr(self.arrays, name)[:used].copy() for name in by_row}
+        arrays, n = self.arrays, len(self)
+        count = arrays.count[:n]
+        ends = np.cumsum(count)
+        total = int(count.sum())
+        rows = np.arange(total) + np.repeat(arrays.offset[:n] - (ends - count), count)
+        arrays.offset[:n] = arrays.low[:n] = ends - count
+        arrays.high[:n] = ends
+        arrays.sizes[1] = total
+        cells = _cells_for(int(arrays.sizes[2]))
+        self.arrays = arrays._replace(
+            points=arrays.points[rows],
+            weights=arrays.weights[rows],
+            owner=np.repeat(np.arange(n), count),
+            spans=np.zeros((total, 4)),
+            next_span=np.full(total, -1),
+            span_cell=np.full(total, -1),
+            cell_keys=np.full(cells, EMPTY),
+            cell_heads=np.full(cells, -1),
         )
+        self.reindex()
 
     def moved(self, pose_new_old: SE2) -> CurveMap:
         """The same curves in another frame: exact, only the index is made anew."""
@@ -159,6 +173,11 @@ class CurveMap:
         self.arrays.cell_keys[:] = EMPTY
         self.arrays.cell_heads[:] = -1
         _reindex(self.arrays, self.matrix, self.knot_step_m)
+
+
+def _cells_for(count: int) -> int:
+    """Size of a hash that holds so many cells and is not crowded: a power of two."""
+    return 1 << math.ceil(math.log2(max(4 * count, 16)))
 
 
 def _grown(array: np.ndarray, size: int, fill: int) -> np.ndarray:

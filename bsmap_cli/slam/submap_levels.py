@@ -27,7 +27,7 @@ class SubmapLevels(Levels[CurveMap]):
         self._levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self._waiting: list[tuple[int, CompactClusters, Vector, float]] = []
         self._inserted = 0
-        self._apart = [1] * (len(self._levels) - 1)
+        self._finished = False
 
     def __len__(self) -> int:
         return len(self._levels)
@@ -58,15 +58,19 @@ class SubmapLevels(Levels[CurveMap]):
 
         At the end of a map that grows, a scan needs them all.
         """
-        ladder = self._settings.ladder
-        self._levels[-1].trim()
-        self._apart = [every_nth(step, ladder[-1]) for step in ladder[:-1]]
+        self._finished = True
+        for level in self._levels:
+            level.trim()
 
     def _draw_waiting(self) -> None:
         ladder, fitting = self._settings.ladder, self._settings.fitting
+        apart = [every_nth(step, ladder[-1]) if self._finished else 1 for step in ladder]
         for n, packed, pose, sigma_m in self._waiting:
             scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
             for k, level in enumerate(self._levels[:-1]):
-                if n % self._apart[k] == 0:
+                if n % apart[k] == 0:
                     insert_clusters(level, scan[k], pose, self._settings)
         self._waiting.clear()
+        if self._finished:
+            for level in self._levels[:-1]:
+                level.trim()
