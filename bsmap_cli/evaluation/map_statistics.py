@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bsmap_cli.evaluation.occupancy import MOST_CELLS, grid_frame, occupancy, trinary_png
 from bsmap_cli.evaluation.redundancy import SAMPLES_PER_STEP, redundancy
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.map_document import LevelSamples, MapDocument, MapLevel
 from bsmap_cli.mapping.map_file import MapSizes, write_map
-from bsmap_cli.mapping.sampling import sample_level
+from bsmap_cli.mapping.sampling import drawn_pieces, evaluate, sample_places
 
 GRID_M = 0.05
 
@@ -104,7 +105,11 @@ def map_statistics(document: MapDocument, sizes: MapSizes) -> MapStatistics:
 
 def drawn_length(samples: LevelSamples) -> float:
     """Length of the drawn curves [m], as chords between the samples."""
-    chords = np.diff(samples.points, axis=0)[np.diff(samples.piece) == 0]
+    return _length(samples.points, samples.piece)
+
+
+def _length(points: Points, piece: NDArray[np.int64]) -> float:
+    chords = np.diff(points, axis=0)[np.diff(piece) == 0]
     return float(np.hypot(chords[:, 0], chords[:, 1]).sum())
 
 
@@ -118,10 +123,12 @@ def _drawn(level: MapLevel) -> tuple[float, Points]:
     """Length of what is drawn [m], and points that have its bounding box."""
     length_m, corners = 0.0, [np.zeros((0, 2))]
     for _, part in level.portions():
-        samples = sample_level(part, level.knot_step_m / SAMPLES_PER_STEP)
-        if len(samples.points):
-            length_m += drawn_length(samples)
-            corners += [samples.points.min(axis=0)[None], samples.points.max(axis=0)[None]]
+        pieces = drawn_pieces(part)
+        piece, u = sample_places(part, pieces, level.knot_step_m / SAMPLES_PER_STEP)
+        points, _ = evaluate(part, pieces.curve[piece], u)
+        if len(points):
+            length_m += _length(points, piece)
+            corners += [points.min(axis=0)[None], points.max(axis=0)[None]]
     return length_m, np.concatenate(corners)
 
 

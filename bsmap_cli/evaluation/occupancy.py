@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.errors import UsageError
-from bsmap_cli.evaluation.visibility import visible_cells
+from bsmap_cli.evaluation.visibility import bands, visible_cells
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.map_document import LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import DrawnPieces, drawn_pieces, evaluate, sample_pieces
@@ -23,7 +23,7 @@ OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 MARGIN_M = 0.5
 MOST_CELLS = 2**27
 ROOMY = 0.9  # of that: bends reach a little beyond the ends of curves
-SAMPLES_AT_ONCE = 1_000_000
+SAMPLES_AT_ONCE = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,17 +144,29 @@ def trinary_png(cells: Cells) -> bytes:
     Shades are 0 occupied, 1 unknown, 3 free.
     """
     rows, columns = cells.shape
-    shades = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
-    shades[:, :columns] = (cells == UNKNOWN) + np.uint8(3) * (cells == FREE)
-    packed = shades.reshape(rows, -1, 4) @ np.array([64, 16, 4, 1], np.uint8)
-    lines = np.zeros((rows, packed.shape[1] + 1), np.uint8)  # filter type 0 before each line
-    lines[:, 1:] = packed[::-1]
+    packer = zlib.compressobj(9)
+    data = b"".join(packer.compress(_png_lines(band)) for band in _from_above(cells))
     head = struct.pack(">IIBBBBB", columns, rows, 2, 0, 0, 0, 0)
-    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(lines.tobytes(), 9)), (b"IEND", b""))
+    chunks = ((b"IHDR", head), (b"IDAT", data + packer.flush()), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
         for kind, data in chunks
     )
+
+
+def _from_above(cells: Cells) -> Iterator[Cells]:
+    return (cells[::-1][first:last] for first, last in bands(cells.shape))
+
+
+def _png_lines(cells: Cells) -> bytes:
+    """Rows of a PNG, four pixels a byte, first row first."""
+    rows, columns = cells.shape
+    shades = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
+    shades[:, :columns] = (cells == UNKNOWN) + np.uint8(3) * (cells == FREE)
+    packed = shades.reshape(rows, -1, 4) @ np.array([64, 16, 4, 1], np.uint8)
+    lines = np.zeros((rows, packed.shape[1] + 1), np.uint8)  # filter type 0 before each line
+    lines[:, 1:] = packed
+    return lines.tobytes()
 
 
 def _mark(facing: Cells, frame: GridFrame, samples: LevelSamples) -> None:

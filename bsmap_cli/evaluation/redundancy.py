@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.evaluation.near_pairs import Cells, Pairs, places_near, sort_into_cells
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.map_document import PORTION, LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import sample_level
@@ -15,10 +16,10 @@ from bsmap_cli.mapping.sampling import sample_level
 SAMPLES_PER_STEP = 4
 MOST_PAIRS = 5e6  # that are looked at together: some hundred megabytes
 REACH = 0.5  # [knot steps] between a sample and the curve that covers it
+LONGER = 0.02  # than a quarter of a knot step may a part be: curves have about unit speed
+ELSEWHERE = 10.0  # [knot steps] between the places of two curves: apart
 APART = 2.0  # [knot steps] in tau from which on a curve may cover itself
 COS_TURN = math.cos(math.radians(30.0))
-
-Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def redundancy(level: MapLevel, samples: LevelSamples | None = None) -> float:
@@ -76,14 +77,32 @@ def covered_samples(
     chord = samples.points[first + 1] - samples.points[first]
     length = np.hypot(chord[:, 0], chord[:, 1])
     middles, segment = _parts(samples, first, chord, length, knot_step_m)
-    reach_m = REACH * knot_step_m + 0.51 * knot_step_m / SAMPLES_PER_STEP
+    reach_m = (REACH + 0.5 * (1.0 + LONGER) / SAMPLES_PER_STEP) * knot_step_m
+    cells = sort_into_cells(middles, reach_m, samples.points)
     covered = np.zeros(len(samples.tau_m), bool)
-    blocks = math.ceil(_crowd(samples.points, middles, reach_m) / MOST_PAIRS)
-    for rows in np.array_split(np.arange(len(covered)), max(blocks, 1)):
-        near, part = near_pairs(samples.points[rows], middles, reach_m)
+    met = _met(samples, first[segment], cells, knot_step_m)
+    blocks = math.ceil(cells.crowd(len(met)) / MOST_PAIRS)
+    for rows in np.array_split(met, max(blocks, 1)):
+        near, part = cells.pairs(samples.points[rows])
         pairs = rows[near], segment[part]
         covered[_covered(samples, curve_ids, knot_step_m, first, chord, length, pairs)] = True
     return covered
+
+
+def _met(
+    samples: LevelSamples, other: NDArray[np.int64], cells: Cells, knot_step_m: float
+) -> NDArray[np.int64]:
+    """The samples that have anything near but their own surroundings: in most maps, few.
+
+    other : the sample at which each of the points in the cells begins.
+    """
+    ahead_m = np.diff(samples.tau_m)
+    ahead_m[np.diff(samples.curve) != 0] = ELSEWHERE * knot_step_m
+    places = np.concatenate(([0.0], np.cumsum(ahead_m)))  # along all curves, laid end to end
+    near = places_near(cells, places[other], samples.points)
+    # a little less than apart: the sum has been rounded
+    apart_m = 0.99 * APART * knot_step_m
+    return np.flatnonzero((places - near[0] > apart_m) | (near[1] - places > apart_m))
 
 
 def _covered(
@@ -120,13 +139,6 @@ def _covered(
     return np.asarray(sample[heavier & (np.hypot(off[:, 0], off[:, 1]) <= REACH * knot_step_m)])
 
 
-def _crowd(points: Points, others: Points, reach_m: float) -> float:
-    """About how many pairs lie within reach: what a map drawn many times over must not hold."""
-    cell = np.floor(others / reach_m).astype(np.int64)
-    _, count = np.unique(cell[:, 0] * (1 << 31) + cell[:, 1], return_counts=True)
-    return 9.0 * len(points) * float((count**2).sum()) / max(len(others), 1)
-
-
 def _parts(
     samples: LevelSamples,
     first: NDArray[np.int64],
@@ -136,34 +148,8 @@ def _parts(
 ) -> tuple[Points, NDArray[np.int64]]:
     """Middles of all segments, and their numbers; segments that are long count in parts."""
     part_m = knot_step_m / SAMPLES_PER_STEP
-    parts = np.maximum(np.ceil(length / part_m - 1e-6), 1).astype(np.int64)
+    parts = np.maximum(np.ceil(length / part_m - LONGER), 1).astype(np.int64)
     segment = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(segment)) - np.repeat(np.cumsum(parts) - parts, parts)
     share = (number + 0.5) / parts[segment]
     return samples.points[first[segment]] + share[:, None] * chord[segment], segment
-
-
-def near_pairs(points: Points, others: Points, reach_m: float) -> Pairs:
-    """Rows of points and of others that may be within `reach_m`: all that are, and a few more.
-
-    Both are hashed into square cells of that side; a point meets the 3 x 3 cells round its own.
-    """
-    if not len(points) or not len(others):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    low = np.minimum(points.min(axis=0), others.min(axis=0)) - reach_m
-    cell = np.floor((points - low) / reach_m).astype(np.int64)
-    other_cell = np.floor((others - low) / reach_m).astype(np.int64)
-    columns = int(max(cell[:, 0].max(), other_cell[:, 0].max())) + 2
-    other_key = other_cell @ [1, columns]
-    order = np.argsort(other_key, kind="stable")
-    ordered = other_key[order]
-    found: list[Pairs] = []
-    for row in (-1, 0, 1):
-        # three cells of one row have consecutive keys
-        key = cell @ [1, columns] + row * columns
-        begin = np.searchsorted(ordered, key - 1)
-        count = np.searchsorted(ordered, key + 1, side="right") - begin
-        which = np.repeat(np.arange(len(points)), count)
-        number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        found.append((which, order[begin[which] + number]))
-    return np.concatenate([a for a, _ in found]), np.concatenate([b for _, b in found])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,8 @@ RAYS = 480
 FARTHEST_STEP = 12  # [cells] that a ray may leap through empty space
 VIEW_SPACING = 30.0  # [cells]: nearer viewpoints add next to nothing
 LARGEST_JUMP = 10.0  # [cells] between neighbouring rays that still see one surface
+
+CELLS_AT_ONCE = 2**22  # of a grid: what is reckoned of them takes tens of bytes each
 
 
 def visible_cells(facing: NDArray[np.uint8], views: Points, range_max: float) -> NDArray[np.bool_]:
@@ -35,18 +39,27 @@ def _spread(views: Points, shape: tuple[int, ...]) -> Points:
     return views[np.sort(first)]
 
 
-def _clearance(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Chessboard distance to the nearest occupied cell, at most `FARTHEST_STEP`."""
-    clearance = np.zeros(occupied.shape, np.uint8)
-    reached = occupied.copy()
-    for _ in range(FARTHEST_STEP):
-        clearance += ~reached
-        grown = reached.copy()
-        grown[1:] |= reached[:-1]
-        grown[:-1] |= reached[1:]
-        reached = grown.copy()
-        reached[:, 1:] |= grown[:, :-1]
-        reached[:, :-1] |= grown[:, 1:]
+def bands(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """First and last row (exclusive) of parts of a grid that are worked on at once."""
+    rows, columns = shape
+    some = max(1, CELLS_AT_ONCE // max(columns, 1))
+    return ((first, min(first + some, rows)) for first in range(0, rows, some))
+
+
+def _clearance(facing: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Chessboard distance to the nearest cell that a curve passes, at most `FARTHEST_STEP`."""
+    clearance = np.zeros(facing.shape, np.uint8)
+    for first, last in bands(facing.shape):
+        begin = max(first - FARTHEST_STEP, 0)
+        reached = facing[begin : last + FARTHEST_STEP] != 0
+        for _ in range(FARTHEST_STEP):
+            clearance[first:last] += ~reached[first - begin : last - begin]
+            grown = reached.copy()
+            grown[1:] |= reached[:-1]
+            grown[:-1] |= reached[1:]
+            reached = grown.copy()
+            reached[:, 1:] |= grown[:, :-1]
+            reached[:, :-1] |= grown[:, 1:]
     return clearance
 
 
@@ -58,7 +71,7 @@ def _directions() -> Points:
 def _cast(facing: NDArray[np.uint8], views: Points, range_max: float) -> Vector:
     """Range [cells] of every ray of every view; 0 where it shows nothing."""
     rows, columns = facing.shape
-    clearance = _clearance(facing != 0).ravel()
+    clearance = _clearance(facing).ravel()
     ray = np.arange(len(views) * RAYS, dtype=np.int32)
     x, y = np.repeat(views, RAYS, axis=0).astype(np.float32).T.copy()
     dx, dy = np.tile(_directions().astype(np.float32), (len(views), 1)).T.copy()
@@ -98,24 +111,46 @@ def _fill(shape: tuple[int, ...], views: Points, ranges: NDArray[np.float64]) ->
     next_a = centre + np.roll(begin, -1, axis=1)[..., None] * after
     starts = np.concatenate((a.reshape(-1, 2), b.reshape(-1, 2)))
     ends = np.concatenate((b.reshape(-1, 2), next_a.reshape(-1, 2)))
-    return _winding(shape, starts, ends) > 0
+    return _inside(shape, starts, ends)
 
 
-def _winding(shape: tuple[int, ...], starts: Points, ends: Points) -> NDArray[np.int32]:
-    """Winding number of closed outlines, given by their edges, round each cell's centre."""
-    rows, columns = shape
+def _inside(shape: tuple[int, ...], starts: Points, ends: Points) -> NDArray[np.bool_]:
+    """Cells round whose centre closed outlines wind, given by their edges."""
+    inside = np.zeros(shape, bool)
     low = np.minimum(starts[:, 1], ends[:, 1])
     high = np.maximum(starts[:, 1], ends[:, 1])
-    first = np.clip(np.ceil(low - 0.5), 0, rows).astype(np.int64)  # rows whose centre is crossed
-    count = np.clip(np.ceil(high - 0.5), 0, rows).astype(np.int64) - first
+    # rows whose centre is crossed
+    begin = np.clip(np.ceil(low - 0.5), 0, shape[0]).astype(np.int64)
+    end = np.clip(np.ceil(high - 0.5), 0, shape[0]).astype(np.int64)
+    for first, last in bands(shape):
+        edge = np.flatnonzero((begin < last) & (end > first))
+        rows = np.maximum(begin[edge], first), np.minimum(end[edge], last)
+        winding = _winding((last - first, shape[1]), starts[edge], ends[edge], rows, first)
+        inside[first:last] = winding > 0
+    return inside
+
+
+def _winding(
+    shape: tuple[int, ...],
+    starts: Points,
+    ends: Points,
+    crossed: tuple[NDArray[np.int64], NDArray[np.int64]],
+    first: int,
+) -> NDArray[np.int32]:
+    """Winding number round each cell's centre, in the rows from `first` on.
+
+    crossed : first and last row (exclusive) that each edge crosses there.
+    """
+    rows, columns = shape
+    count = crossed[1] - crossed[0]
     edge = np.repeat(np.arange(len(starts)), count)
-    row = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    row = crossed[0][edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
     run, rise = (ends - starts)[edge].T
     crossing = starts[edge, 0] + (row + 0.5 - starts[edge, 1]) * run / rise
     # an edge counts for the cells to the left of where it crosses their row
     column = np.clip(np.ceil(crossing - 0.5), 0, columns).astype(np.int64)
     change = np.bincount(
-        row * (columns + 1) + column, np.sign(rise), minlength=rows * (columns + 1)
+        (row - first) * (columns + 1) + column, np.sign(rise), minlength=rows * (columns + 1)
     ).reshape(rows, columns + 1)
     from_right = np.cumsum(change[:, :0:-1], axis=1)[:, ::-1]
     return np.rint(from_right).astype(np.int32)

@@ -65,16 +65,22 @@ class MapLevel:
 
     def only(self, kept: NDArray[np.bool_]) -> MapLevel:
         """Without the curves that are not kept; kept : (K,)."""
-        rows = np.repeat(kept, self.point_counts)
+        counts = self.point_counts[kept]
+        # by number, not by a mask as long as the level: often a few are taken of many
+        skipped = self.offsets()[:-1][kept] - (np.cumsum(counts) - counts)
+        rows = np.repeat(skipped, counts) + np.arange(int(counts.sum()))
+        return self._part(kept, rows)
+
+    def _part(self, curves: NDArray[np.bool_] | slice, rows: NDArray[np.int64] | slice) -> MapLevel:
         return replace(
             self,
-            curve_ids=self.curve_ids[kept],
-            tau_start_m=self.tau_start_m[kept],
-            tau_end_m=self.tau_end_m[kept],
-            flags=self.flags[kept],
-            observations=self.observations[kept],
-            first_indices=self.first_indices[kept],
-            point_counts=self.point_counts[kept],
+            curve_ids=self.curve_ids[curves],
+            tau_start_m=self.tau_start_m[curves],
+            tau_end_m=self.tau_end_m[curves],
+            flags=self.flags[curves],
+            observations=self.observations[curves],
+            first_indices=self.first_indices[curves],
+            point_counts=self.point_counts[curves],
             control_points=self.control_points[rows],
             weights=self.weights[rows],
         )
@@ -88,10 +94,9 @@ class MapLevel:
         first = done = 0
         while first < len(self):
             last = max(first + 1, int(np.searchsorted(ends, done + most, side="right")))
-            kept = np.zeros(len(self), bool)
-            kept[first:last] = True
-            yield first, self.only(kept)
-            first, done = last, int(ends[last - 1])
+            end = int(ends[last - 1])
+            yield first, self._part(slice(first, last), slice(done, end))
+            first, done = last, end
 
     def moved(self, pose_new_old: SE2) -> MapLevel:
         """The same curves in another frame."""

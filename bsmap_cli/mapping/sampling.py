@@ -93,14 +93,21 @@ def sample_counts(level: MapLevel, pieces: DrawnPieces, step_m: float) -> NDArra
     return np.asarray(intervals.astype(np.int64) + 1)
 
 
-def sample_pieces(level: MapLevel, pieces: DrawnPieces, step_m: float) -> LevelSamples:
-    """The same for some pieces of the level's curves."""
+def sample_places(
+    level: MapLevel, pieces: DrawnPieces, step_m: float
+) -> tuple[NDArray[np.int64], Vector]:
+    """Piece and u [knot steps] of each sample that `sample_pieces` takes."""
     counts = sample_counts(level, pieces, step_m)
     intervals = (counts - 1).astype(np.float64)
     piece = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = number / intervals[piece]
-    u = (1.0 - fraction) * pieces.start[piece] + fraction * pieces.end[piece]
+    return piece, (1.0 - fraction) * pieces.start[piece] + fraction * pieces.end[piece]
+
+
+def sample_pieces(level: MapLevel, pieces: DrawnPieces, step_m: float) -> LevelSamples:
+    """The same for some pieces of the level's curves."""
+    piece, u = sample_places(level, pieces, step_m)
     curve = pieces.curve[piece]
     points, weight = evaluate(level, curve, u)
     velocity, _ = evaluate(level, curve, u, derivative=1)

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.evaluation.map_statistics import map_statistics, sizes_of
-from bsmap_cli.evaluation.redundancy import near_pairs, redundancy
-from bsmap_cli.mapping.map_document import MapDocument
+from bsmap_cli.evaluation.near_pairs import near_pairs
+from bsmap_cli.evaluation.redundancy import redundancy
+from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.map_file import read_map_with_sizes, write_map
 from bsmap_cli.mapping.sampling import sample_level
 from tests.maps import arc_points, line_points, make_level, room_document
@@ -68,6 +69,22 @@ def test_redundancy_in_tiles_is_that_of_the_whole(monkeypatch):
     assert whole > 1.01
     monkeypatch.setattr("bsmap_cli.evaluation.redundancy.PORTION", 100)
     assert redundancy(level) == pytest.approx(whole, abs=1e-12)
+
+
+def test_portions_of_a_level_are_its_curves_in_order():
+    rng = np.random.default_rng(5)
+    curves = [line_points((0, k), (rng.uniform(0.4, 4.0), k), 0.1) for k in range(20)]
+    level = make_level(curves, weights=rng.integers(1, 4, sum(map(len, curves))))
+    portions = list(level.portions(50))
+    assert len(portions) > 3
+    for first, part in portions:
+        kept = (np.arange(len(level)) >= first) & (np.arange(len(level)) < first + len(part))
+        for name in MapLevel.__dataclass_fields__:
+            np.testing.assert_array_equal(getattr(part, name), getattr(level.only(kept), name))
+    joined = np.concatenate([part.control_points for _, part in portions])
+    np.testing.assert_array_equal(joined, level.control_points)
+    odd = level.only(np.arange(len(level)) % 2 == 1)
+    np.testing.assert_array_equal(odd.control_points, np.concatenate(curves[1::2]).astype("f4"))
 
 
 LINE = line_points((0, 0), (4, 0), 0.1)

@@ -122,6 +122,15 @@ def test_a_map_turned_by_a_quarter_has_the_same_grid_turned():
         assert (turned.cells == state).sum() == pytest.approx((grid.cells == state).sum(), rel=0.03)
 
 
+def test_a_grid_worked_on_a_few_rows_at_a_time_is_the_same(monkeypatch):
+    whole = room(((1.0, 1.0), (4.0, 3.2)))
+    picture = trinary_png(whole.cells)
+    monkeypatch.setattr("bsmap_cli.evaluation.visibility.CELLS_AT_ONCE", 1000)
+    in_parts = room(((1.0, 1.0), (4.0, 3.2)))
+    np.testing.assert_array_equal(in_parts.cells, whole.cells)
+    assert trinary_png(in_parts.cells) == picture
+
+
 def test_an_empty_map_has_an_empty_grid():
     assert occupancy([make_level([])], np.zeros((1, 2))).cells.shape == (0, 0)
 
