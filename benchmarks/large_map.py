@@ -3,7 +3,8 @@
 python benchmarks/large_map.py [--points 10000000] [--only query,svg] [--keep FOLDER] [--json FILE]
 
 The map is a small one laid side by side as often as that takes. Each command has a process of its
-own: seconds until it is done, processor seconds, most memory, and the size of what it wrote.
+own: seconds until it is done, processor seconds, most memory, and the size of what it wrote, as
+rows of the table in docs/performance.md. What takes more than --limit or --memory is ended.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,8 @@ from bsmap_cli.pipeline import run_slam
 
 LOG = Path(__file__).parent.parent / "sample_logs" / "loop.csv.gz"
 EXPORTS = ("svg", "geojson", "csv", "json", "yaml", "mcap", "dxf", "ply", "png")
+GRIDS = ("yaml", "png")
+CELL_M = 0.2  # of their cells, where 5 cm are refused
 QUESTIONS = 1000
 GAP_M = 1.0  # between two copies
 
@@ -67,11 +71,20 @@ def tiled(document: MapDocument, points: int) -> MapDocument:
     return replace(document, levels=(large,))
 
 
-def questions(document: MapDocument, angles: bool) -> str:
+def make(folder: Path, points: int) -> tuple[int, list[float], list[float]]:
+    """Write the small map and the large one; control points of the large one, and its corners."""
+    small = small_map()
+    document = tiled(small, points)
+    for made, name in ((small, "small"), (document, "large")):
+        with (folder / f"{name}.bsm").open("wb") as stream:
+            write_map(stream, made)
+    control = document.finest.control_points
+    return len(control), control.min(axis=0).tolist(), control.max(axis=0).tolist()
+
+
+def questions(low: list[float], high: list[float], angles: bool) -> str:
     """Rows of CSV: points all over the map, with directions for rays."""
     random = np.random.default_rng(1)
-    level = document.finest
-    low, high = level.control_points.min(axis=0), level.control_points.max(axis=0)
     rows = random.uniform(low, high, (QUESTIONS, 2))
     if angles:
         rows = np.column_stack((rows, random.uniform(-180.0, 180.0, QUESTIONS)))
@@ -79,24 +92,34 @@ def questions(document: MapDocument, angles: bool) -> str:
 
 
 def commands(
-    made: Path, folder: Path, document: MapDocument
+    made: Path, folder: Path, low: list[float], high: list[float]
 ) -> Iterator[tuple[str, list[str], str]]:
     """Name, arguments and standard input of everything that is asked of a map."""
-    for name in ("stats", "stats --json"):
-        yield name, ["stats", str(made), *name.split()[1:]], ""
+    yield "stats", ["stats", str(made)], ""
     for kind in ("nearest", "ray", "distance"):
-        asked = questions(document, kind == "ray")
-        yield f"query {kind}, one", ["query", str(made), kind, asked.splitlines()[0]], ""
+        asked = questions(low, high, kind == "ray")
         yield f"query {kind}, {QUESTIONS}", ["query", str(made), kind], asked
+    yield "query nearest, one", ["query", str(made), "nearest", "1,1"], ""
     for suffix in EXPORTS:
-        yield f"export {suffix}", ["export", str(made), "-o", str(folder / f"m.{suffix}")], ""
+        yield (
+            f"export {suffix}",
+            ["export", str(made), "-o", str(folder / f"{suffix}.{suffix}")],
+            "",
+        )
+    for suffix in GRIDS:
+        wide = ["--resolution", f"{CELL_M:g}", "-o", str(folder / f"{suffix}-wide.{suffix}")]
+        yield f"export {suffix}, {CELL_M:g} m", ["export", str(made), *wide], ""
     yield "plot png", ["plot", str(made), "-o", str(folder / "plot.png")], ""
     yield "view html", ["view", str(made), "-o", str(folder / "view.html")], ""
-    yield "diff", ["diff", str(made), str(made), "--at", "0,0,0"], ""
+    itself = [str(made), str(made), "--at", "0,0,0"]
+    yield "diff with itself", ["diff", *itself], ""
+    yield "merge with itself", ["merge", *itself, "-o", str(folder / "merged.bsm")], ""
 
 
-def measured(arguments: list[str], asked: str, limit_s: float) -> dict[str, Any]:
-    """Run one command to its end, or until the limit."""
+def measured(
+    arguments: list[str], asked: str, limit_s: float = 600.0, limit_mb: float = math.inf
+) -> dict[str, Any]:
+    """Run one command to its end, or until a limit."""
     began = time.perf_counter()
     with tempfile.TemporaryFile() as source:
         source.write(asked.encode())
@@ -111,6 +134,8 @@ def measured(arguments: list[str], asked: str, limit_s: float) -> dict[str, Any]
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if pid:
                 break
+            if held_mb(process.pid) > limit_mb:
+                process.kill()
             time.sleep(0.02)
         else:
             process.kill()
@@ -125,6 +150,33 @@ def measured(arguments: list[str], asked: str, limit_s: float) -> dict[str, Any]
     }
 
 
+def held_mb(process: int) -> float:
+    """Memory that a process holds now; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    except (OSError, IndexError):
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def written(out: Path | None) -> list[Path]:
+    """What was written under the name, its image beside a YAML included."""
+    return sorted(out.parent.glob(f"{out.stem}.*")) if out else []
+
+
+def row(title: str, figures: dict[str, Any]) -> str:
+    """A row of the table: what failed says why, what was ended says so."""
+    seconds = (f"{figures[key]:.1f}" for key in ("seconds", "processor_seconds"))
+    size_mb = figures["megabytes_out"]
+    name = title
+    if figures["status"] < 0:
+        name += ": ended, not done"
+    elif figures["status"]:
+        name += f": refused ({' '.join(figures['said'])})"
+    memory, out = f"{figures['peak_memory_mb']:.0f}", f"{size_mb:.1f}" if size_mb else ""
+    return f"| {' | '.join((name, *seconds, memory, out))} |"
+
+
 def main() -> None:
     """Make the map, then print a row for each command."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -132,31 +184,32 @@ def main() -> None:
     parser.add_argument("--only", default="", help="commands whose names hold one of these, by ,")
     parser.add_argument("--keep", type=Path, help="work here, and leave what was written")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for one command")
+    parser.add_argument("--memory", type=float, default=8000.0, help="MB for one command")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures")
     arguments = parser.parse_args()
     wanted = [part for part in arguments.only.split(",") if part]
     found: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as name:
-        folder = arguments.keep or Path(name)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.keep or Path(temporary)
         folder.mkdir(exist_ok=True)
         made = folder / "large.bsm"
-        document = tiled(small_map(), arguments.points)
-        with made.open("wb") as stream:
-            write_map(stream, document)
-        print(f"{len(document.finest.control_points)} control points, {made.stat().st_size} bytes")
-        print(f"{'':<22}{'s':>9}{'cpu s':>9}{'peak MB':>9}{'MB out':>9}", flush=True)
-        for title, command, asked in commands(made, folder, document):
+        # in a process of its own: a child counts the memory of its parent as its own
+        with get_context("spawn").Pool(1) as pool:
+            count, low, high = pool.apply(make, (folder, arguments.points))
+        for _, command, asked in commands(folder / "small.bsm", folder, low, high):
+            measured([*command, *(["-f"] if "-o" in command else [])], asked)  # compiles
+        print(f"{count} control points, {made.stat().st_size} bytes")
+        print("\n| | s | cpu s | peak MB | MB out |\n|---|---|---|---|---|", flush=True)
+        for title, command, asked in commands(made, folder, low, high):
             if wanted and not any(part in title for part in wanted):
                 continue
             out = Path(command[command.index("-o") + 1]) if "-o" in command else None
-            figures = measured([*command, *(["-f"] if out else [])], asked, arguments.limit)
-            size_mb = out.stat().st_size / 1e6 if out and out.exists() else 0.0
+            for old in written(out):
+                old.unlink()
+            figures = measured(command, asked, arguments.limit, arguments.memory)
+            size_mb = sum(path.stat().st_size for path in written(out)) / 1e6
             found[title] = {**figures, "megabytes_out": size_mb}
-            numbers = (figures["seconds"], figures["processor_seconds"])
-            print(f"{title:<22}" + "".join(f"{value:>9.1f}" for value in numbers), end="")
-            print(f"{figures['peak_memory_mb']:>9.0f}{size_mb:>9.1f}", end="")
-            failed = f"  exit {figures['status']} {figures['said']}" if figures["status"] else ""
-            print(failed, flush=True)
+            print(row(title, found[title]), flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=1) + "\n")
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.evaluation.near_pairs import near_pairs
+from bsmap_cli.evaluation.near_pairs import Pairs, sort_into_cells
 from bsmap_cli.evaluation.occupancy import FREE, grid_frame, occupancy
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.map_document import LevelSamples, MapDocument
@@ -155,7 +155,21 @@ def _aside(samples: _Sampled, others: _Sampled, tolerance_m: float) -> Vector:
     A curve is taken for straight next to its nearest sample, and to end half a spacing behind.
     """
     aside = np.full(len(samples.points), np.inf)
-    sample, other = near_pairs(samples.points, others.points, tolerance_m)
+    if not len(samples.points) or not len(others.points):
+        return aside
+    cells = sort_into_cells(others.points, tolerance_m, samples.points)
+    for rows in cells.blocks(np.arange(len(aside))):
+        near, other = cells.pairs(samples.points[rows])
+        found, across = _nearest_aside(samples, others, (rows[near], other), tolerance_m)
+        aside[found] = across
+    return aside
+
+
+def _nearest_aside(
+    samples: _Sampled, others: _Sampled, pairs: Pairs, tolerance_m: float
+) -> tuple[NDArray[np.int64], Vector]:
+    """The samples that are near another that runs their way, and how far off they are."""
+    sample, other = pairs
     same_way = (samples.tangents[sample] * others.tangents[other]).sum(axis=1) >= SAME_WAY
     sample, other = sample[same_way], other[same_way]
     gap = samples.points[sample] - others.points[other]
@@ -166,8 +180,7 @@ def _aside(samples: _Sampled, others: _Sampled, tolerance_m: float) -> Vector:
     nearest = order[first]
     tangent = others.tangents[other[nearest]]
     across = gap[nearest, 0] * tangent[:, 1] - gap[nearest, 1] * tangent[:, 0]
-    aside[sample[nearest]] = np.abs(across)
-    return aside
+    return sample[nearest], np.abs(across)
 
 
 def _lengths(samples: _Sampled) -> Vector:

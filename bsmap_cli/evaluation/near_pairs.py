@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 Integers = NDArray[np.int64]
 Pairs = tuple[Integers, Integers]
 
+MOST_PAIRS = 5e6  # that are looked at together: some hundred megabytes
 NO_CELL = np.iinfo(np.int64).max
 
 
@@ -33,7 +35,10 @@ class Cells(NamedTuple):
         return _keys(points, self.low, self.reach_m, self.columns)
 
     def pairs(self, points: Points) -> Pairs:
-        """Rows of (n, 2) points and of those in the 3 x 3 cells round their own."""
+        """Rows of (n, 2) points and of those in the 3 x 3 cells round their own.
+
+        That is all pairs that are within reach, and a few more.
+        """
         key = self.keys_of(points)
         found: list[Pairs] = []
         for row in (-1, 0, 1):
@@ -46,10 +51,12 @@ class Cells(NamedTuple):
             found.append((which, self.order[begin[which] + number]))
         return np.concatenate([a for a, _ in found]), np.concatenate([b for _, b in found])
 
-    def crowd(self, points: int) -> float:
-        """About how many pairs so many points make: what is drawn many times over has too many."""
+    def blocks(self, rows: Integers) -> list[Integers]:
+        """Rows of points that ask, in parts that make some million pairs each, about."""
+        # what is drawn many times over makes many
         count = np.diff(np.append(_firsts(self.keys), len(self.keys))).astype(np.float64)
-        return 9.0 * points * float(count @ count) / max(len(self.keys), 1)
+        pairs = 9.0 * len(rows) * float(count @ count) / max(len(self.keys), 1)
+        return np.array_split(rows, max(math.ceil(pairs / MOST_PAIRS), 1))
 
 
 def sort_into_cells(points: Points, reach_m: float, asking: Points) -> Cells:
@@ -60,13 +67,6 @@ def sort_into_cells(points: Points, reach_m: float, asking: Points) -> Cells:
     keys = _keys(points, low, reach_m, columns)
     order = np.argsort(keys, kind="stable")
     return Cells(low, reach_m, columns, keys[order], order)
-
-
-def near_pairs(points: Points, others: Points, reach_m: float) -> Pairs:
-    """Rows of points and of others that may be within `reach_m`: all that are, and a few more."""
-    if not len(points) or not len(others):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    return sort_into_cells(others, reach_m, points).pairs(points)
 
 
 def places_near(cells: Cells, places: Vector, points: Points) -> tuple[Vector, Vector]:

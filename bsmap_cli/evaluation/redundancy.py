@@ -14,7 +14,6 @@ from bsmap_cli.mapping.map_document import PORTION, LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import sample_level
 
 SAMPLES_PER_STEP = 4
-MOST_PAIRS = 5e6  # that are looked at together: some hundred megabytes
 REACH = 0.5  # [knot steps] between a sample and the curve that covers it
 LONGER = 0.02  # than a quarter of a knot step may a part be: curves have about unit speed
 ELSEWHERE = 10.0  # [knot steps] between the places of two curves: apart
@@ -81,8 +80,7 @@ def covered_samples(
     cells = sort_into_cells(middles, reach_m, samples.points)
     covered = np.zeros(len(samples.tau_m), bool)
     met = _met(samples, first[segment], cells, knot_step_m)
-    blocks = math.ceil(cells.crowd(len(met)) / MOST_PAIRS)
-    for rows in np.array_split(met, max(blocks, 1)):
+    for rows in cells.blocks(met):
         near, part = cells.pairs(samples.points[rows])
         pairs = rows[near], segment[part]
         covered[_covered(samples, curve_ids, knot_step_m, first, chord, length, pairs)] = True

@@ -25,7 +25,7 @@ from tests.acceptance.driving import end_of
 
 FINEST_M = 0.1  # knot step of the map
 LONG = pytest.mark.skipif(
-    "BSMAP_LONG" not in os.environ, reason="takes a minute: set BSMAP_LONG=1 to run it"
+    "BSMAP_LONG" not in os.environ, reason="takes two minutes: set BSMAP_LONG=1 to run it"
 )
 AHEAD = SE2(0.8, 0.0, 0.0)
 # with three degrees of freedom the truth lies farther off once in seventy thousand times

@@ -142,6 +142,13 @@ def test_the_wider_knot_step_is_the_tolerance():
     assert map_difference(ROOM, ROOM, HERE, tolerance_m=0.02).tolerance_m == 0.02
 
 
+def test_few_pairs_at_a_time_tell_the_same(monkeypatch):
+    aside = moved(without(ROOM, 1), SE2(0.03, -0.02, 0.01))
+    whole = map_difference(ROOM, aside, HERE).as_json()
+    monkeypatch.setattr("bsmap_cli.evaluation.near_pairs.MOST_PAIRS", 500.0)
+    assert map_difference(ROOM, aside, HERE).as_json() == whole
+
+
 def test_maps_that_draw_nothing_have_nothing_in_common():
     blank = replace(ROOM.finest, weights=np.zeros_like(ROOM.finest.weights))
     nothing = replace(ROOM, levels=(blank,))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.evaluation.map_statistics import map_statistics, sizes_of
-from bsmap_cli.evaluation.near_pairs import near_pairs
+from bsmap_cli.evaluation.near_pairs import sort_into_cells
 from bsmap_cli.evaluation.redundancy import redundancy
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.map_file import read_map_with_sizes, write_map
@@ -118,7 +118,8 @@ def test_a_curve_that_goes_round_twice_covers_itself():
 def test_near_pairs_miss_none(seed, reach):
     rng = np.random.default_rng(seed)
     points, others = rng.uniform(-2, 2, (20, 2)), rng.uniform(-2, 2, (30, 2))
-    found = list(zip(*(rows.tolist() for rows in near_pairs(points, others, reach)), strict=True))
+    cells = sort_into_cells(others, reach, points)
+    found = list(zip(*(rows.tolist() for rows in cells.pairs(points)), strict=True))
     assert len(found) == len(set(found))
     distance = np.hypot(*(points[:, None] - others[None]).transpose(2, 0, 1))
     assert {(int(i), int(j)) for i, j in np.argwhere(distance <= reach)} <= set(found)
