@@ -13,6 +13,7 @@ import argparse
 import json
 import math
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -130,16 +131,15 @@ def measured(
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
         )
-        while time.perf_counter() - began < limit_s:
+        allowed = (math.ceil(limit_s), math.ceil(limit_s))
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, allowed)
+        while True:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if pid:
                 break
             if held_mb(process.pid) > limit_mb:
                 process.kill()
             time.sleep(0.02)
-        else:
-            process.kill()
-            _, status, usage = os.wait4(process.pid, 0)
     said = process.stderr.read().decode() if process.stderr else ""
     return {
         "seconds": time.perf_counter() - began,
@@ -183,7 +183,9 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=10_000_000)
     parser.add_argument("--only", default="", help="commands whose names hold one of these, by ,")
     parser.add_argument("--keep", type=Path, help="work here, and leave what was written")
-    parser.add_argument("--limit", type=float, default=600.0, help="seconds for one command")
+    parser.add_argument(
+        "--limit", type=float, default=600.0, help="processor seconds for one command"
+    )
     parser.add_argument("--memory", type=float, default=8000.0, help="MB for one command")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures")
     arguments = parser.parse_args()
