@@ -183,10 +183,8 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=10_000_000)
     parser.add_argument("--only", default="", help="commands whose names hold one of these, by ,")
     parser.add_argument("--keep", type=Path, help="work here, and leave what was written")
-    parser.add_argument(
-        "--limit", type=float, default=600.0, help="processor seconds for one command"
-    )
-    parser.add_argument("--memory", type=float, default=8000.0, help="MB for one command")
+    parser.add_argument("--limit", type=float, default=600.0, help="processor seconds for each")
+    parser.add_argument("--memory", type=float, default=8000.0, help="MB for each")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures")
     arguments = parser.parse_args()
     wanted = [part for part in arguments.only.split(",") if part]
