@@ -17,30 +17,58 @@ GROWN = 1.05  # closures that move little are taken in when the graph has grown 
 STILL_STEPS = 0.02  # finest knot steps: a solution that still moves by less has converged
 
 
-@kernel
 def surest_chains(
-    source: int, links: Vector, first: Integers, second: Integers, matches: Vector
-) -> Vector:
-    """(n,) least sum of variances on the way from node `source` to every node.
+    source: int, links: Vector, first: Integers, second: Integers, matches: Points
+) -> Points:
+    """(m, n) least sums of variances on the way from node `source` to every node, of m kinds.
 
-    links : (n - 1,) between neighbours; matches : of the edges between nodes `first` and `second`.
+    links : (m, n - 1) between neighbours; matches : (m, e) of the edges between nodes `first` and
+    `second`.
     """
-    found = np.full(len(links) + 1, math.inf)
-    found[source] = 0.0
-    changed = True
-    while changed:  # as often as a chain goes over edges
-        for k in range(len(links)):
-            found[k + 1] = min(found[k + 1], found[k] + links[k])
-        for k in range(len(links) - 1, -1, -1):
-            found[k] = min(found[k], found[k + 1] + links[k])
-        changed = False
-        for e in range(len(first)):
-            i, j = first[e], second[e]
-            if found[i] > found[j] + matches[e] or found[j] > found[i] + matches[e]:
-                found[i] = min(found[i], found[j] + matches[e])
-                found[j] = min(found[j], found[i] + matches[e])
-                changed = True
+    apart = first != second
+    low, high = np.minimum(first, second)[apart], np.maximum(first, second)[apart]
+    matches = matches[:, apart]
+    by_low, by_high = np.argsort(low, kind="stable"), np.argsort(high, kind="stable")
+    found = np.full((len(links), links.shape[1] + 1), math.inf)
+    found[:, source] = 0.0
+    for kind in range(len(links)):
+        _sweep(links[kind], low, high, matches[kind], by_low, by_high, found[kind])
     return found
+
+
+@kernel
+def _sweep(
+    links: Vector,
+    low: Integers,
+    high: Integers,
+    matches: Vector,
+    by_low: Integers,
+    by_high: Integers,
+    found: Vector,
+) -> None:
+    """Up and down the nodes, each asking those that it has passed, until nothing gets less.
+
+    It takes as many rounds as a chain turns, not as it has edges.
+    """
+    changed = True
+    while changed:
+        changed = False
+        e = 0
+        for k in range(1, len(found)):
+            least = min(found[k], found[k - 1] + links[k - 1])
+            while e < len(high) and high[by_high[e]] <= k:
+                least = min(least, found[low[by_high[e]]] + matches[by_high[e]])
+                e += 1
+            changed = changed or least < found[k]
+            found[k] = least
+        e = len(low) - 1
+        for k in range(len(found) - 2, -1, -1):
+            least = min(found[k], found[k + 1] + links[k])
+            while e >= 0 and low[by_low[e]] >= k:
+                least = min(least, found[high[by_low[e]]] + matches[by_low[e]])
+                e -= 1
+            changed = changed or least < found[k]
+            found[k] = least
 
 
 class SubmapGraph:
@@ -121,16 +149,26 @@ class SubmapGraph:
         links = np.array(self._links).reshape(-1, 2)
         match_m, match_rad = way_deviation(0.0, self._local.settings.ladder[-1])
         levers_m = np.hypot(*(self.poses[:, :2] - self.poses[submap, :2]).T)
-        matches = np.ones(len(first))
-        metres = surest_chains(submap, links[:, 0].copy(), first, second, match_m * matches)
-        radians = surest_chains(submap, links[:, 1].copy(), first, second, match_rad * matches)
-        lost_m = surest_chains(submap, links[:, 0] - match_m, first, second, 0.0 * matches)
-        squares_m2 = surest_chains(
+        metres, radians, lost_m, squares_m2 = surest_chains(
             submap,
-            match_m**2 + (links[:, 1] * levers_m[1:]) ** 2,
+            np.stack(
+                (
+                    links[:, 0],
+                    links[:, 1],
+                    links[:, 0] - match_m,
+                    match_m**2 + (links[:, 1] * levers_m[1:]) ** 2,
+                )
+            ),
             first,
             second,
-            match_m**2 + (match_rad * levers_m[second]) ** 2,
+            np.stack(
+                (
+                    np.full(len(first), match_m),
+                    np.full(len(first), match_rad),
+                    np.zeros(len(first)),
+                    match_m**2 + (match_rad * levers_m[second]) ** 2,
+                )
+            ),
         )
         return metres, radians, lost_m + np.sqrt(squares_m2)
 

@@ -40,9 +40,10 @@ def test_every_node_is_reached_over_the_surest_chain(source, links, loops):
     first, second, matches = ([loop[k] for loop in loops] for k in range(3))
     found = surest_chains(
         source,
-        np.array(links),
+        np.array([links, links[::-1]]),
         np.array(first, np.int64),
         np.array(second, np.int64),
-        np.array(matches, float),
+        np.array([matches, matches[::-1]], float),
     )
-    assert found == pytest.approx(least_sums(source, links, first, second, matches))
+    assert found[1] == pytest.approx(least_sums(source, links[::-1], first, second, matches[::-1]))
+    assert found[0] == pytest.approx(least_sums(source, links, first, second, matches))
