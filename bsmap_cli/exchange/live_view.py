@@ -142,6 +142,7 @@ class LiveView:
                 continue
             self._drawn[submap.index] = len(submap.keyframes)
             level = freeze_level(submap.levels[-1], max_weight=max_weight)
+            submap.fold()
             name = _frame(submap.index)
             changed.append(self._make.curves(name, name, level, max_weight, self._clock_ns))
         if changed:

@@ -79,6 +79,7 @@ class CurveMap:
 
     The state is `arrays`; kernels write into it. `reserve` makes room before they run.
     tracks : the clusters of the last scan, where they are tracked by their centroids.
+    folded : there is no index of the spans for now, see `fold`.
     """
 
     def __init__(self, knot_step_m: float, degree: int, *, rows: int = 256) -> None:
@@ -87,6 +88,7 @@ class CurveMap:
         self.matrix = basis_matrix(degree)
         self.arrays = _empty_level(64, rows, 512)
         self.tracks: Tracks | None = None
+        self.folded = False
 
     def __len__(self) -> int:
         return int(self.arrays.sizes[0])
@@ -136,6 +138,11 @@ class CurveMap:
 
     def trim(self) -> None:
         """Give back the room for control points to come; `reserve` makes it again."""
+        self.fold()
+        self.unfold()
+
+    def fold(self) -> None:
+        """Keep the curves alone, an eighth of the memory: none may look at it before `unfold`."""
         arrays, n = self.arrays, len(self)
         count = arrays.count[:n]
         ends = np.cumsum(count)
@@ -144,11 +151,27 @@ class CurveMap:
         arrays.offset[:n] = arrays.low[:n] = ends - count
         arrays.high[:n] = ends
         arrays.sizes[1] = total
-        cells = _cells_for(int(arrays.sizes[2]))
+        none = np.empty(0, np.int64)
+        columns = ("first", "count", "offset", "low", "high", "seen", "support")
         self.arrays = arrays._replace(
+            **{name: getattr(arrays, name)[: n + 2].copy() for name in columns},
             points=arrays.points[rows],
             weights=arrays.weights[rows],
-            owner=np.repeat(np.arange(n), count),
+            owner=none,
+            spans=np.empty((0, 4)),
+            next_span=none,
+            span_cell=none,
+            cell_keys=none,
+            cell_heads=none,
+        )
+        self.folded = True
+
+    def unfold(self) -> None:
+        """Index the spans again, the same way each time."""
+        arrays, n = self.arrays, len(self)
+        total, cells = len(arrays.weights), _cells_for(int(arrays.sizes[2]))
+        self.arrays = arrays._replace(
+            owner=np.repeat(np.arange(n), arrays.count[:n]),
             spans=np.zeros((total, 4)),
             next_span=np.full(total, -1),
             span_cell=np.full(total, -1),
@@ -156,6 +179,7 @@ class CurveMap:
             cell_heads=np.full(cells, -1),
         )
         self.reindex()
+        self.folded = False
 
     def moved(self, pose_new_old: SE2) -> CurveMap:
         """The same curves in another frame: exact, only the index is made anew."""

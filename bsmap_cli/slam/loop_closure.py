@@ -26,6 +26,7 @@ from bsmap_cli.slam.wide_search import search
 
 HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search
+OPEN = 48  # submaps that stay open for the next registration
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
 WIDE_STEPS = 200.0  # from this reach on deviations count as those of a long way
 LEAST_SCORE, LEAST_WIDE_SCORE = 0.4, 0.5  # of a place worth refining; right ones mostly have 0.7
@@ -50,7 +51,9 @@ class LoopSettings:
     uniqueness: float = setting(
         1.1, "the best place must score so many times the best place elsewhere", minimum=1.0
     )
-    tries: int = setting(2, "most searches for one keyframe", minimum=1)
+    tries: int = setting(
+        2, "most searches for one keyframe; all keyframes together have one each", minimum=1
+    )
     retry: float = setting(
         10.0, "way before a submap is searched again [finest knot steps]", minimum=0.0
     )
@@ -77,6 +80,7 @@ class LoopCloser:
     _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
     _next_try: Vector = field(default_factory=lambda: np.empty(0))
     _drawn: dict[int, Submap] = field(default_factory=dict)
+    _open: dict[int, Submap] = field(default_factory=dict)
     _viewpoints: Viewpoints = field(default_factory=Viewpoints)
     _travelled_m: float = 0.0
 
@@ -117,9 +121,11 @@ class LoopCloser:
         distances = self._viewpoints.distances(self.graph.poses, here.x, here.y, within)
         found = np.flatnonzero((distances < within) & (self._next_try[:count] <= self._travelled_m))
         nearest = found[np.argsort(distances[found] / within[found], kind="stable")]
+        # round and round the same way ever more submaps hold the place: the nearest will do
+        most = min(settings.tries, keyframe.index - self.tried)
         return [
             (self.local.submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
-            for k in nearest[: settings.tries].tolist()
+            for k in nearest[:most].tolist()
         ]
 
     def _remember(self, count: int) -> None:
@@ -144,10 +150,14 @@ class LoopCloser:
         again_m = max(settings.loops.retry * unit, RETRY_SHARE * reach_m)
         self._next_try[submap.index] = self._travelled_m + again_m
         guess = (self.graph.pose(submap.index).inverse() @ self._pose_map(keyframe)).as_array()
-        far = reach_m > DIRECT_STEPS * unit
-        if far:
+        folded = _oldest(self._open, submap, OPEN)
+        if folded:
+            folded.fold()
+        if reach_m > DIRECT_STEPS * unit:
             likelihood = submap.likelihood(cell_m=CELL_STEPS * unit, heights=HEIGHTS)
-            self._keep_drawn(submap)
+            forgotten = _oldest(self._drawn, submap, DRAWN)
+            if forgotten:
+                forgotten.forget_likelihood()
             coarse = clusters[max(0, len(clusters) - 2)]
             window = Window(guess, reach_m, reach_rad)
             floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
@@ -189,13 +199,6 @@ class LoopCloser:
         else:
             self._accept(loop)
         self._next_try[submap.index] = self._travelled_m + 3.0 * settings.loops.retry * unit
-
-    def _keep_drawn(self, submap: Submap) -> None:
-        """Likelihoods take far more memory than curves: keep those that were asked for last."""
-        self._drawn.pop(submap.index, None)
-        self._drawn[submap.index] = submap
-        if len(self._drawn) > DRAWN:
-            self._drawn.pop(next(iter(self._drawn))).forget_likelihood()
 
     def _good(self, result: RegistrationResult, unit_m: float) -> bool:
         settings = self.local.settings.loops
@@ -250,6 +253,13 @@ class LoopCloser:
                 return
         self._doubtful.append((loop, wanted))
         del self._doubtful[:-50]
+
+
+def _oldest(kept: dict[int, Submap], asked: Submap, most: int) -> Submap | None:
+    """Note which submaps were asked for last, `most` of them; the one that this drives out."""
+    kept.pop(asked.index, None)
+    kept[asked.index] = asked
+    return kept.pop(next(iter(kept))) if len(kept) > most else None
 
 
 def _position_deviation(information: Points) -> float:

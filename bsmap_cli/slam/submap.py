@@ -80,6 +80,10 @@ class Submap:
         self._drawn.finish()
         self.forget_likelihood()
 
+    def fold(self) -> None:
+        """Give back what the curves of a finished submap are made ready with when asked for."""
+        self._drawn.fold()
+
     def forget_likelihood(self) -> None:
         """Give the memory back."""
         self._likelihood = None

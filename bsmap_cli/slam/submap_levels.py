@@ -35,6 +35,11 @@ class SubmapLevels(Levels[CurveMap]):
     def _at(self, k: int) -> CurveMap:
         if self._waiting and k < len(self) - 1:
             self._draw_waiting()
+        return self._open(k)
+
+    def _open(self, k: int) -> CurveMap:
+        if self._levels[k].folded:
+            self._levels[k].unfold()
         return self._levels[k]
 
     def insert(
@@ -59,17 +64,22 @@ class SubmapLevels(Levels[CurveMap]):
         At the end of a map that grows, a scan needs them all.
         """
         self._finished = True
+        self.fold()
+
+    def fold(self) -> None:
+        """Give back what can be made again, where nothing more is inserted."""
         for level in self._levels:
-            level.trim()
+            if self._finished and not level.folded:
+                level.fold()
 
     def _draw_waiting(self) -> None:
         ladder, fitting = self._settings.ladder, self._settings.fitting
         apart = [every_nth(step, ladder[-1]) if self._finished else 1 for step in ladder]
         for n, packed, pose, sigma_m in self._waiting:
             scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
-            for k, level in enumerate(self._levels[:-1]):
+            for k in range(len(self) - 1):
                 if n % apart[k] == 0:
-                    insert_clusters(level, scan[k], pose, self._settings)
+                    insert_clusters(self._open(k), scan[k], pose, self._settings)
         self._waiting.clear()
         if self._finished:
             for level in self._levels[:-1]:

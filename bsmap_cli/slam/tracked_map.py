@@ -34,6 +34,7 @@ def tracked_levels(
         seen = submap.to_submap(keyframes[first].pose_local)
         pose_map_submap = SE2.from_array(poses[first]) @ seen.inverse()
         moved = [level.moved(pose_map_submap) for level in submap.levels]
+        submap.fold()
         if settings.visibility.method == "evidence":
             own = [keyframes[k] for k in submap.keyframes]
             remove_contradicted(moved, own, poses[submap.keyframes], settings, sigma_m)

@@ -12,6 +12,7 @@ from bsmap_cli.mapping.segmentation import SegmentationSettings
 from bsmap_cli.sensor.simulator.simulation import simulate
 from bsmap_cli.slam.final_map import FinalMapSettings
 from bsmap_cli.slam.keyframes import KeyframeSettings
+from bsmap_cli.slam.loop_closure import LoopSettings
 from bsmap_cli.slam.slam import Slam
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.submap import SubmapSettings
@@ -135,6 +136,17 @@ def as_bytes(result):
         arrays += [level.control_points, level.weights, level.first_indices, level.point_counts]
         arrays += [level.tau_start_m, level.tau_end_m, level.observations, level.flags]
     return [array.tobytes() for array in arrays]
+
+
+def test_round_and_round_the_searches_are_no_more_than_the_keyframes():
+    settings = replace(
+        DEFAULT,
+        submaps=SubmapSettings(keyframes=4),
+        loops=LoopSettings(tries=9, retry=0.0),
+        final_map=FinalMapSettings(rebuild=False),
+    )
+    figures = run(simulated("spin").scans(), settings).figures
+    assert 0.5 * figures["keyframes"] < figures["loops_tried"] <= figures["keyframes"]
 
 
 def test_two_runs_give_the_same_bytes():

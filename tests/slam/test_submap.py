@@ -62,3 +62,24 @@ def test_a_finished_submap_draws_its_coarser_levels_from_fewer_keyframes(level):
     assert np.abs(signed_distance(few)).max() < 0.1 * SETTINGS.ladder[level]
     apart = np.hypot(*(every[:, None] - few[None]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() < SETTINGS.ladder[level]
+
+
+def memory(levels):
+    """Bytes of all levels, not asking for any."""
+    return sum(array.nbytes for level in levels._levels for array in level.arrays)
+
+
+def test_a_folded_submap_is_small_and_shows_the_same_whenever_it_is_asked():
+    levels = drawn(asking_after=())
+    levels.fold()  # nothing: more may be inserted
+    assert not levels[-1].folded
+    levels.finish()
+    opened = [level.arrays for level in levels]
+    full = memory(levels)
+    for _ in range(2):
+        levels.fold()
+        assert memory(levels) < 0.3 * full
+        for level, before in zip(levels, opened, strict=True):
+            for name in before._fields:
+                if name not in ("span_cell", "cell_keys", "cell_heads"):  # slots of a hash
+                    assert np.array_equal(getattr(level.arrays, name), getattr(before, name))
