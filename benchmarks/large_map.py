@@ -172,7 +172,7 @@ def row(title: str, figures: dict[str, Any]) -> str:
     if figures["status"] < 0:
         name += ": ended, not done"
     elif figures["status"]:
-        name += f": refused ({' '.join(figures['said'])})"
+        name += f": refused ({' '.join(figures['said']).removeprefix('error: ')})"
     memory, out = f"{figures['peak_memory_mb']:.0f}", f"{size_mb:.1f}" if size_mb else ""
     return f"| {' | '.join((name, *seconds, memory, out))} |"
 
