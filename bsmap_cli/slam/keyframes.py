@@ -17,6 +17,13 @@ class KeyframeSettings:
 
     distance: float = setting(2.0, "way since the last keyframe [finest knot steps]", minimum=0.0)
     angle_deg: float = setting(7.0, "turn since the last keyframe", minimum=0.0)
+    overlap: float = setting(
+        0.8,
+        "a scan that has less than this share on the map of what scans had on it since the last "
+        "keyframe is one, too: through a door, a step shows a room",
+        minimum=0.0,
+        maximum=1.0,
+    )
 
 
 @dataclass(slots=True)

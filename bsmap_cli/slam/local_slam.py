@@ -51,6 +51,7 @@ class LocalSlam:
     _coasted_m: float = 0.0
     _coasted_rad: float = 0.0
     _explained: float = 1.0
+    _overlap: float = 0.0
     _cadence: Cadence = field(default_factory=Cadence)
     _predictor: Predictor = field(init=False)
 
@@ -107,6 +108,8 @@ class LocalSlam:
         self._afresh = self._afresh and (lost or not told)
         moved = pose.relative_to(self.keyframes[-1].pose_local)
         due = is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1])
+        self._overlap = max(self._overlap, result.inlier_ratio)
+        due = due or result.inlier_ratio < self.settings.keyframes.overlap * self._overlap
         keyframe = None
         if lost and self._afresh and prediction.by_odometry:
             # new ground would hold as little of such scans as this does: they are too sparse
@@ -144,7 +147,7 @@ class LocalSlam:
             weak=weak,
         )
         self.keyframes.append(keyframe)
-        self._coasted_m = self._coasted_rad = 0.0
+        self._coasted_m = self._coasted_rad = self._overlap = 0.0
         began = time.perf_counter()
         for submap in self.submaps[self.finished :]:
             submap.insert(keyframe, clusters, self.sigma_m)
