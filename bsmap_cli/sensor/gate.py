@@ -16,6 +16,9 @@ from bsmap_cli.settings import setting
 
 FARTHEST_STEPS = 300.0  # [finest knot steps]: farther away, beams lie too far apart for curves
 NO_RETURN_SHARE = 0.995  # of range_max: "a hair less" is a code for no return, too
+# three deviations of 1 %, as short-range lidars have: nearer the limit readings err to one side,
+# as no surface beyond it answers that would err to the other, and walls bend where they leave sight
+FAIR_SHARE = 0.97
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +130,7 @@ def used_beams(scan: Scan, settings: SensorSettings) -> NDArray[np.bool_]:
 
 def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tuple[float, float]:
     """Shortest and longest range [m] that counts as a return of this scan."""
-    far = scan.range_max_m * NO_RETURN_SHARE
+    far = scan.range_max_m * FAIR_SHARE
     if not 0.0 < far < math.inf:
         far = math.inf
     far = min(far, settings.range_max_m or FARTHEST_STEPS * knot_step_m)
