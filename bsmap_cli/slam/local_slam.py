@@ -145,6 +145,7 @@ class LocalSlam:
             coasted_m=self._coasted_m,
             coasted_rad=self._coasted_rad,
             weak=weak,
+            explained=result.inlier_ratio if result else 0.0,
         )
         self.keyframes.append(keyframe)
         self._coasted_m = self._coasted_rad = self._overlap = 0.0

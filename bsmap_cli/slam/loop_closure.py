@@ -31,6 +31,7 @@ DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
 WIDE_STEPS = 200.0  # from this reach on deviations count as those of a long way
 LEAST_SCORE, LEAST_WIDE_SCORE = 0.4, 0.5  # of a place worth refining; right ones mostly have 0.7
 RETRY_SHARE = 0.05  # of its reach: way before a search is worth repeating
+KEPT = 0.83  # of what a scan had on the map it was tracked on; less: a place that is only like it
 AGREED_STEPS = 2.0  # two closures from far off may contradict one another by so much
 URGENT_STEPS = 2.0  # a closure that moves the map by more is taken in before the next search
 
@@ -186,7 +187,7 @@ class LoopCloser:
             sigma_m=self.local.sigma_m,
             settings=settings.registration.far_off(),
         )
-        if not self._good(result, unit):
+        if not self._good(result, unit) or result.inlier_ratio < KEPT * keyframe.explained:
             return
         loop = Loop(
             submap.index,
