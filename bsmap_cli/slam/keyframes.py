@@ -34,7 +34,8 @@ class Keyframe:
     the drifting local frame. submap : index of the submap it was matched against.
     information : (3, 3) of that match. coasted_m, coasted_rad : what the way and the turn from the
     last keyframe may be off because no wall told. weak : tracking had lost the map here.
-    explained : share of its points that lay on the map it was tracked on. sight : what the scan looked through, where that is asked for.
+    explained : share of its points that lay on the map it was tracked on. sight : what the scan
+    looked through, where that is asked for.
     """
 
     index: int
