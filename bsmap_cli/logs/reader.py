@@ -10,8 +10,8 @@ from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.scan import Scan
 
 WARNINGS_LIMIT = 50
-TELL_PLACE = " (tell its place with --laser-pose x,y,yaw_deg)"
 """A log that is wrong in ever new ways must not fill the screen."""
+TELL_PLACE = " (tell its place with --laser-pose x,y,yaw_deg)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

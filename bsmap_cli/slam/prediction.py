@@ -56,8 +56,7 @@ class Prediction(NamedTuple):
 
     sigma_m, sigma_rad : how far the true step may be off. drift_m : what a step adds to the error
     of the way where nothing but this prediction is known, drift_rad : to that of the heading.
-    by_odometry : wheels say so, and not
-    the motion so far.
+    by_odometry : wheels say so, and not the motion so far.
     """
 
     step: SE2

@@ -20,7 +20,7 @@ STILL_STEPS = 0.02  # finest knot steps: a solution that still moves by less has
 def surest_chains(
     source: int, links: Vector, first: Integers, second: Integers, matches: Points
 ) -> Points:
-    """(m, n) least sums of variances on the way from node `source` to every node, of m kinds.
+    """(m, n) least sums of what errs on the way from node `source` to every node, of m kinds.
 
     links : (m, n - 1) between neighbours; matches : (m, e) of the edges between nodes `first` and
     `second`.
