@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -32,6 +33,10 @@ def write_viewer_mcap(
 ) -> None:
     """Write `/map/curves` (foxglove.SceneUpdate), `/map/path` and `/map/grid` (ROS 2 messages).
 
+    The curves of a large map are parted: what is too much for one message goes to
+    `/map/curves/2` and so on. Each has a topic of its own, as a viewer that jumps in time shows
+    the last message of each.
+
     scans : written along the selection's trajectory with the transform from the map to the base,
     so that a viewer replays the run; each takes the pose whose stamp is nearest. Map messages
     bear the first stamp of the trajectory, 0 where there is none.
@@ -40,8 +45,9 @@ def write_viewer_mcap(
     stamps = selection.stamps_ns if selection.stamps_ns is not None else np.zeros(1, np.int64)
     first_ns = max(int(stamps.min(initial=2**62)) if len(stamps) else 0, 0)
     messages = _Messages(file, selection.frame, first_ns)
-    scene = messages.scene(selection, tolerance_m)
-    file.add_json("/map/curves", SCENE_UPDATE, first_ns, scene, SCENE_UPDATE_SCHEMA)
+    for number, scene in enumerate(messages.scenes(selection, tolerance_m), 1):
+        topic = "/map/curves" if number == 1 else f"/map/curves/{number}"
+        file.add_json(topic, SCENE_UPDATE, first_ns, scene, SCENE_UPDATE_SCHEMA)
     if len(selection.path):
         file.add_ros("/map/path", "nav_msgs/msg/Path", first_ns, messages.path(selection.path))
     if any(len(selected.pieces.curve) for selected in selection.levels):
@@ -79,22 +85,27 @@ class _Messages:
         self._frame = frame
         self._stamp_ns = stamp_ns
 
-    def scene(self, selection: Selection, tolerance_m: float) -> dict[str, Any]:
-        """One entity a level, one line strip for each drawn piece of a curve."""
+    def scenes(self, selection: Selection, tolerance_m: float) -> Iterator[dict[str, Any]]:
+        """Messages of one entity a level, with one line strip for each drawn piece of a curve."""
+        most = selection.document.max_weight
+        numbered = zip_longest(*(level.portions() for level in selection.levels))
+        for portions in numbered:
+            entities = [self._entity(part, most, tolerance_m) for part in portions if part]
+            yield {"deletions": [], "entities": entities}
+        if selection.is_empty:
+            yield {"deletions": [], "entities": []}
+
+    def _entity(self, selected: SelectedLevel, max_weight: int, tolerance_m: float) -> Any:
         seconds, nanoseconds = divmod(self._stamp_ns, _SECOND_NS)
-        entities = [
-            {
-                "timestamp": {"sec": seconds, "nsec": nanoseconds},
-                "frame_id": self._frame,
-                "id": f"curves {selected.level.knot_step_m:g}",
-                "lifetime": {"sec": 0, "nsec": 0},
-                "frame_locked": True,
-                "metadata": [],
-                "lines": _line_strips(selected, selection.document.max_weight, tolerance_m),
-            }
-            for selected in selection.levels
-        ]
-        return {"deletions": [], "entities": entities}
+        return {
+            "timestamp": {"sec": seconds, "nsec": nanoseconds},
+            "frame_id": self._frame,
+            "id": f"curves {selected.level.knot_step_m:g}",
+            "lifetime": {"sec": 0, "nsec": 0},
+            "frame_locked": True,
+            "metadata": [],
+            "lines": _line_strips(selected, max_weight, tolerance_m),
+        }
 
     def path(self, poses: NDArray[np.float64]) -> Any:
         """The path as nav_msgs/Path."""

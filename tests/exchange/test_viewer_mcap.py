@@ -2,6 +2,8 @@
 
 import io
 import json
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from bsmap_cli.exchange.selection import select
 from bsmap_cli.exchange.viewer_mcap import write_viewer_mcap
 from bsmap_cli.geometry.se2 import SE2
-from bsmap_cli.mapping.map_document import MapDocument
+from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
 from tests.exchange.exported import assert_same_lines, wavy_document, written
@@ -59,6 +61,20 @@ def test_line_strips_are_the_curves():
     assert len(lines) == 4
     assert {line["type"] for line in entity["lines"]} == {0}
     assert_same_lines(lines, document.finest)
+
+
+def test_curves_of_a_large_map_have_several_topics(monkeypatch):
+    document = replace(wavy_document(levels=(0.2, 0.1)), parts=True)
+    (whole,) = messages(written(write_viewer_mcap, select(document)))[:1]
+    monkeypatch.setattr(MapLevel.portions, "__defaults__", (20,))
+    parts = messages(written(write_viewer_mcap, select(document)))
+    parts = [message for message in parts if "curves" in message[0]]
+    assert [topic for topic, *_ in parts] == ["/map/curves", "/map/curves/2", "/map/curves/3"]
+    for k in (0, 1):
+        level = f"curves {document.levels[k].knot_step_m:g}"
+        entities = [entity for message in parts for entity in message[3]["entities"]]
+        lines = [entity["lines"] for entity in entities if entity["id"] == level]
+        assert whole[3]["entities"][k]["lines"] == list(chain.from_iterable(lines))
 
 
 def test_path_and_grid():
