@@ -112,15 +112,21 @@ class LoopCloser:
         if count == 0:
             return []
         self._remember(count)
-        metres, radians, far_m = self.graph.deviations_from(keyframe.submap)
+        metres, radians = self.graph.deviations_from(keyframe.submap)
         here = self._pose_map(keyframe)
         view_m = median_range(keyframe.clusters.points)
-        widest_m = np.maximum(settings.deviations * far_m[:count], WIDE_STEPS * unit)
-        reach_m = np.minimum(settings.deviations * metres[:count], widest_m)
-        reach_m = np.minimum(reach_m, settings.max_reach * unit)
+        reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
+        due = self._next_try[:count] <= self._travelled_m
+        distances = self._viewpoints.distances(
+            self.graph.poses, here.x, here.y, np.where(due, view_m + reach_m, 0.0)
+        )
+        wide = due & (distances < view_m + reach_m) & (reach_m > WIDE_STEPS * unit)
+        if wide.any():
+            far_m = self.graph.far_deviations_from(keyframe.submap)[:count]
+            widest_m = np.maximum(settings.deviations * far_m, WIDE_STEPS * unit)
+            reach_m = np.minimum(reach_m, widest_m)
         within = view_m + reach_m
-        distances = self._viewpoints.distances(self.graph.poses, here.x, here.y, within)
-        found = np.flatnonzero((distances < within) & (self._next_try[:count] <= self._travelled_m))
+        found = np.flatnonzero(due & (distances < within))
         nearest = found[np.argsort(distances[found] / within[found], kind="stable")]
         # round and round the same way ever more submaps hold the place: the nearest will do
         most = min(settings.tries, keyframe.index - self.tried)
