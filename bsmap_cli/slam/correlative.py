@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.compiled import inlined, kernel, lean_part, part
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.slam.likelihood import Likelihood
+from bsmap_cli.slam.search_window import heights_for
 
 Integers = NDArray[np.int64]
 Places = NDArray[np.int32]
+
+BATCH = 32  # points that are summed up before anyone asks whether it is worth while
 
 
 @inlined
 def _channel(tx: float, ty: float) -> int:
     """Channel of a direction: 0 east, 1 north, 2 west, 3 south; a diagonal is of the next one."""
-    if tx > ty:
-        return 0 if ty >= -tx else 3
-    return 1 if tx > -ty else 2 if ty > tx else 3
+    below = 0 if ty >= -tx else 3  # all are worked out, and one is chosen, without a jump
+    above = 1 if tx > -ty else 2 if ty > tx else 3
+    return below if tx > ty else above
 
 
 @lean_part
@@ -48,10 +51,11 @@ def project(
     """
     rows, columns = shape
     cos, sin = math.cos(angle), math.sin(angle)
+    across, up, x, y = cos / cell_m, sin / cell_m, x / cell_m, y / cell_m
     safe, end = 0, len(points)
     for j in range(len(points)):
-        c = math.floor((cos * points[j, 0] - sin * points[j, 1] + x) / cell_m)
-        r = math.floor((sin * points[j, 0] + cos * points[j, 1] + y) / cell_m)
+        c = math.floor(across * points[j, 0] - up * points[j, 1] + x)
+        r = math.floor(up * points[j, 0] + across * points[j, 1] + y)
         tx = cos * tangents[j, 0] - sin * tangents[j, 1]
         ty = sin * tangents[j, 0] + cos * tangents[j, 1]
         channel = _channel(tx, ty)
@@ -67,7 +71,7 @@ def project(
 
 
 @lean_part
-def _score(
+def _add_scores(
     grids: NDArray[np.uint8],
     height: int,
     cells: Integers,
@@ -75,19 +79,37 @@ def _score(
     safe: int,
     dx: int,
     dy: int,
-) -> float:
-    """Mean likelihood of the points shifted by whole cells, or a bound of it above height 0."""
+    apart: int,
+    least: float,
+    totals: Integers,
+) -> None:
+    """Values of all points, shifted by whole cells, at (dx, dy) and the next corners of a square.
+
+    The others lie `apart` cells farther in x, in y, and in both. Where none of the four can come
+    to more than `least`, the sums are given up.
+    """
     _, channels, rows, columns = grids.shape
-    total = 0
     plane = grids[height].reshape(channels * rows * columns)
-    shift = dy * columns + dx
-    for j in range(safe):
-        total += plane[places[j] + shift]
-    for j in range(safe, len(cells)):
-        c, r = cells[j, 0] + dx, cells[j, 1] + dy
-        if 0 <= c < columns and 0 <= r < rows:
-            total += grids[height, cells[j, 2], r, c]
-    return total / (255.0 * len(cells))
+    shift, up = dy * columns + dx, apart * columns
+    near = right = above = far = 0
+    n, done = len(cells), 0
+    while done < safe:
+        end = min(done + BATCH, safe)
+        for j in range(done, end):
+            at = np.uint64(places[j] + shift)  # a signed index would be asked whether it is below 0
+            near += plane[at]
+            right += plane[at + np.uint64(apart)]
+            above += plane[at + np.uint64(up)]
+            far += plane[at + np.uint64(up + apart)]
+        done = end
+        if max(near, right, above, far) + 255 * (n - done) <= least:
+            break
+    totals[0], totals[1], totals[2], totals[3] = near, right, above, far
+    for j in range(safe, n):
+        for k in range(4):
+            c, r = cells[j, 0] + dx + apart * (k & 1), cells[j, 1] + dy + apart * (k >> 1)
+            if 0 <= c < columns and 0 <= r < rows:
+                totals[k] += grids[height, cells[j, 2], r, c]
 
 
 @part
@@ -99,52 +121,49 @@ def descend(
     height: int,
     dx: int,
     dy: int,
+    bound: float,
     reach: int,
     best: float,
     barred: Vector,
 ) -> tuple[float, int, int]:
     """Best translation inside one block of 2^height cells, if it beats `best`.
 
-    reach : translations beyond it lie outside the window, whatever the block.
-    barred : dx, dy and radius [cells] of a disc that does not count.
+    bound : score of the block. reach : translations beyond it lie outside the window, whatever the
+    block. barred : dx, dy and radius [cells] of a disc that does not count.
     """
     stack = np.empty((4 * (height + 1) + 4, 3), np.int64)
     bounds = np.empty(len(stack))
     stack[0, 0], stack[0, 1], stack[0, 2] = height, dx, dy
-    bounds[0] = 2.0
+    bounds[0] = bound
     depth = 1
     found_x, found_y = dx, dy
     found = -1.0
-    children, scores, order = np.empty((4, 2), np.int64), np.empty(4), np.empty(4, np.int64)
+    full = 255.0 * len(cells)
+    totals, order = np.empty(4, np.int64), np.empty(4, np.int64)
     while depth > 0:
         depth -= 1
         if bounds[depth] <= best:
             continue
         h, x, y = stack[depth]
         if h == 0:
-            if (x - barred[0]) ** 2 + (y - barred[1]) ** 2 < barred[2] ** 2:
-                continue
-            score = _score(grids, h, cells, places, safe, x, y)
-            if score > best:
-                best, found, found_x, found_y = score, score, x, y
+            if (x - barred[0]) ** 2 + (y - barred[1]) ** 2 >= barred[2] ** 2:
+                best = found = bounds[depth]
+                found_x, found_y = x, y
             continue
         half = 1 << (h - 1)
+        _add_scores(grids, h - 1, cells, places, safe, x, y, half, best * full, totals)
         for k in range(4):
-            children[k, 0] = x + half * (k & 1)
-            children[k, 1] = y + half * (k >> 1)
-            scores[k] = _score(grids, h - 1, cells, places, safe, children[k, 0], children[k, 1])
             place = k
-            while place > 0 and scores[order[place - 1]] > scores[k]:
+            while place > 0 and totals[order[place - 1]] > totals[k]:
                 order[place] = order[place - 1]
                 place -= 1
             order[place] = k
         for n in range(4):  # best child last, so that it is opened first
             k = int(order[n])
-            if scores[k] > best and max(children[k, 0], children[k, 1]) <= reach:
-                stack[depth, 0] = h - 1
-                stack[depth, 1] = children[k, 0]
-                stack[depth, 2] = children[k, 1]
-                bounds[depth] = scores[k]
+            child_x, child_y = x + half * (k & 1), y + half * (k >> 1)
+            if totals[k] / full > best and max(child_x, child_y) <= reach:
+                stack[depth, 0], stack[depth, 1], stack[depth, 2] = h - 1, child_x, child_y
+                bounds[depth] = totals[k] / full
                 depth += 1
     return found, found_x, found_y
 
@@ -159,15 +178,21 @@ def _bound(
     y: float,
     reach: int,
     cell_m: float,
+    floor: float,
     cells: Integers,
     places: Places,
     safe: Integers,
     bounds: Points,
 ) -> None:
-    """Cells and places of the points at each angle; what no shift within a block can exceed."""
+    """Cells and places of the points at each angle; what no shift within a block can exceed.
+
+    bounds : (angles, rows, columns) of blocks; less where a block is below `floor`.
+    """
     top = grids.shape[0] - 1
     block = 1 << top
-    blocks = (2 * reach + 1 + block - 1) // block
+    side = bounds.shape[1]
+    full = 255.0 * len(points)
+    totals = np.empty(4, np.int64)
     for a in range(len(angles)):
         safe[a] = project(
             points,
@@ -178,13 +203,18 @@ def _bound(
             cell_m,
             grids.shape[2:],
             -reach,
-            reach + block,
+            side * block - reach,
             cells[a],
             places[a],
         )
-        for k in range(blocks * blocks):
-            bx, by = k % blocks * block - reach, k // blocks * block - reach
-            bounds[a, k] = _score(grids, top, cells[a], places[a], safe[a], bx, by)
+        for row in range(0, side, 2):
+            for column in range(0, side, 2):
+                bx, by = column * block - reach, row * block - reach
+                _add_scores(
+                    grids, top, cells[a], places[a], safe[a], bx, by, block, floor * full, totals
+                )
+                for k in range(4):
+                    bounds[a, row + (k >> 1), column + (k & 1)] = totals[k] / full
 
 
 @kernel
@@ -202,16 +232,19 @@ def _search(
     """Best score above `floor`, or -1, its angle index and translation; blocks in this order."""
     top = grids.shape[0] - 1
     block = 1 << top
-    blocks = (2 * reach + 1 + block - 1) // block
+    side = bounds.shape[1]
     best, score = floor, -1.0
     angle, dx, dy = 0, 0, 0
     for k in order:
-        a, b = k // (blocks * blocks), k % (blocks * blocks)
-        if bounds[a, b] <= best:
+        a, row, column = k // (side * side), k // side % side, k % side
+        bound = bounds[a, row, column]
+        if bound <= best:
             break
-        bx, by = b % blocks * block - reach, b // blocks * block - reach
+        x, y = column * block - reach, row * block - reach
+        if max(x, y) > reach:
+            continue
         found, fx, fy = descend(
-            grids, cells[a], places[a], safe[a], top, bx, by, reach, best, barred[a]
+            grids, cells[a], places[a], safe[a], top, x, y, bound, reach, best, barred[a]
         )
         if found > best:
             best = score = found
@@ -233,12 +266,13 @@ def search_angles(
 
     barred : dx, dy and radius [cells] of the disc that does not count at each angle.
     """
-    cell_m, block = likelihood.cell_m, 1 << (len(likelihood.grids) - 1)
+    grids, cell_m = likelihood.grids[: heights_for(reach)], likelihood.cell_m
+    block, (x, y) = 1 << (len(grids) - 1), centre[:2] - likelihood.origin_m
     cells = np.empty((len(angles), len(points), 3), np.int64)
     places, safe = np.empty(cells.shape[:2], np.int32), np.empty(len(angles), np.int64)
-    bounds = np.empty((len(angles), math.ceil((2 * reach + 1) / block) ** 2))
-    grids, (x, y) = likelihood.grids, centre[:2] - likelihood.origin_m
-    _bound(grids, points, tangents, angles, x, y, reach, cell_m, cells, places, safe, bounds)
+    side = 2 * math.ceil((2 * reach + 1) / (2 * block))  # even: four blocks are asked at a time
+    bounds = np.empty((len(angles), side, side))
+    _bound(grids, points, tangents, angles, x, y, reach, cell_m, floor, cells, places, safe, bounds)
     order = np.argsort(-bounds, axis=None, kind="stable")  # likely blocks first
     score, angle, dx, dy = _search(grids, cells, places, safe, bounds, order, reach, floor, barred)
     return score, angles[angle], dx, dy

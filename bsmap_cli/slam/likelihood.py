@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import kernel, lean_part
+from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
@@ -90,27 +90,25 @@ def _stamp(points: Points, directions: Points, cell_m: float, grid: Grid) -> Non
                     grid[channel, r, c] = max(grid[channel, r, c], np.uint8(up[a] * across[b]))
 
 
-@lean_part
-def _larger(one: Row, other: Row, larger: Row) -> None:
-    """The larger of each two values, as far as the shorter row goes."""
-    for c in range(len(other)):
-        larger[c] = max(one[c], other[c])
+def _fill_pyramid(grids: Grid) -> None:
+    """Fill heights 1 .. from height 0: the maximum over windows that double in size.
 
-
-@kernel
-def _pyramid(grids: Grid) -> None:
-    """Fill heights 1 .. from height 0: the maximum over windows that double in size."""
-    heights, channels, rows, columns = grids.shape
-    taller = np.empty(columns, np.uint8)
-    for h in range(1, heights):
+    What a window takes from beyond the end of its row, or of its channel, it finds at the beginning
+    of the next, which is empty there.
+    """
+    columns = grids.shape[3]
+    planes = grids.reshape(len(grids), -1)
+    taller = np.empty_like(planes[0])
+    for h in range(1, len(grids)):
         half = 1 << (h - 1)
-        for k in range(channels):
-            for r in range(rows):
-                _larger(grids[h - 1, k, r], grids[h - 1, k, min(r + half, rows - 1)], taller)
-                right = taller[min(half, columns) :]  # beyond the edge there is nothing
-                _larger(taller, right, grids[h, k, r])
-                for c in range(len(right), columns):
-                    grids[h, k, r, c] = taller[c]
+        _larger(planes[h - 1], half * columns, taller)
+        _larger(taller, half, planes[h])
+
+
+def _larger(values: Row, ahead: int, larger: Row) -> None:
+    """The larger of each value and the one so far ahead."""
+    np.maximum(values[:-ahead], values[ahead:], out=larger[:-ahead])
+    larger[-ahead:] = values[-ahead:]
 
 
 def build_likelihood(curve_map: CurveMap, *, cell_m: float, heights: int) -> Likelihood:
@@ -123,7 +121,8 @@ def build_likelihood(curve_map: CurveMap, *, cell_m: float, heights: int) -> Lik
     # windows towards higher indices look back over the lower edge: pad by the widest one
     origin = origin - cell_m * (1 << (heights - 1))
     columns, rows = (np.ceil((points.max(axis=0) + margin - origin) / cell_m) + 1).astype(int)
-    grids = np.zeros((heights, CHANNELS, rows, columns), np.uint8)
+    grids = np.empty((heights, CHANNELS, rows, columns), np.uint8)
+    grids[0] = 0
     _stamp(points - origin, directions, cell_m, grids[0])
-    _pyramid(grids)
+    _fill_pyramid(grids)
     return Likelihood(grids, origin, cell_m)

@@ -14,20 +14,22 @@ from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.ladder import register_down
+from bsmap_cli.slam.likelihood import Likelihood
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.recovery import CELL_STEPS
 from bsmap_cli.slam.registration import RegistrationResult
-from bsmap_cli.slam.search_window import Window
+from bsmap_cli.slam.search_window import Window, heights_for
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 from bsmap_cli.slam.viewpoints import Viewpoints, median_range
 from bsmap_cli.slam.wide_search import search
 
-HEIGHTS = 6  # of the likelihood pyramid: blocks of 32 cells at the top
+HEIGHTS = 6  # of the likelihood pyramid at most: blocks of 32 cells at the top
 DRAWN = 24  # likelihoods of submaps that are kept for the next search
 OPEN = 48  # submaps that stay open for the next registration
-DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds the place
+DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds a place
+REFINED = 2  # levels, from the finest up, that draw in what a search leaves: less than its cell
 WIDE_STEPS = 200.0  # from this reach on deviations count as those of a long way
 LEAST_SCORE, LEAST_WIDE_SCORE = 0.4, 0.5  # of a place worth refining; right ones mostly have 0.7
 RETRY_SHARE = 0.05  # of its reach: way before a search is worth repeating
@@ -160,40 +162,35 @@ class LoopCloser:
         folded = _oldest(self._open, submap, OPEN)
         if folded:
             folded.fold()
-        if reach_m > DIRECT_STEPS * unit:
-            likelihood = submap.likelihood(cell_m=CELL_STEPS * unit, heights=HEIGHTS)
-            forgotten = _oldest(self._drawn, submap, DRAWN)
-            if forgotten:
-                forgotten.forget_likelihood()
-            coarse = clusters[max(0, len(clusters) - 2)]
-            window = Window(guess, reach_m, reach_rad)
-            floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
-            peak = search(likelihood, coarse.points, coarse.tangents, window, floor=floor)
-            if peak is None:
-                return
-            rival = search(
-                likelihood,
-                coarse.points,
-                coarse.tangents,
-                window,
-                floor=peak.score / settings.loops.uniqueness,
-                barred=peak,
-                apart_m=10.0 * unit,
-            )
-            if rival is not None:
-                return
-            guess = peak.pose
-        deviation = (0.5 * DIRECT_STEPS * unit, 0.1)
+        window = Window(guess, reach_m, reach_rad)
+        coarse = clusters[max(0, len(clusters) - 2)]
+        likelihood = self._likelihood(submap, window)
+        floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
+        peak = search(likelihood, coarse.points, coarse.tangents, window, floor=floor)
+        if peak is None:
+            return
         result = register_down(
-            submap.levels,
-            clusters,
-            guess,
-            guess,
-            isotropic_information(deviation),
+            submap.levels[-REFINED:],
+            clusters[-REFINED:],
+            peak.pose,
+            peak.pose,
+            isotropic_information((0.5 * DIRECT_STEPS * unit, 0.1)),
             sigma_m=self.local.sigma_m,
             settings=settings.registration.far_off(),
         )
         if not self._good(result, unit) or result.inlier_ratio < KEPT * keyframe.explained:
+            return
+        # most places fail above: where else the scan may be is asked of those that fit
+        rival = search(
+            likelihood,
+            coarse.points,
+            coarse.tangents,
+            window,
+            floor=peak.score / settings.loops.uniqueness,
+            barred=peak,
+            apart_m=10.0 * unit,
+        )
+        if rival is not None:
             return
         loop = Loop(
             submap.index,
@@ -206,6 +203,15 @@ class LoopCloser:
         else:
             self._accept(loop)
         self._next_try[submap.index] = self._travelled_m + 3.0 * settings.loops.retry * unit
+
+    def _likelihood(self, submap: Submap, window: Window) -> Likelihood:
+        """What a search in that window looks at; drawn anew where it is not of the last ones."""
+        forgotten = _oldest(self._drawn, submap, DRAWN)
+        if forgotten:
+            forgotten.forget_likelihood()
+        cell_m = CELL_STEPS * self.local.settings.ladder[-1]
+        heights = min(HEIGHTS, heights_for(math.ceil(window.reach_m / cell_m)))
+        return submap.likelihood(cell_m=cell_m, heights=heights)
 
     def _good(self, result: RegistrationResult, unit_m: float) -> bool:
         settings = self.local.settings.loops

@@ -27,6 +27,11 @@ class Window:
     reach_rad: float
 
 
+def heights_for(reach: int) -> int:
+    """Heights of a pyramid whose largest blocks, two by two, hold a window of so many cells."""
+    return 1 + max(0, math.ceil(math.log2(reach + 0.5)))
+
+
 def window_grid(
     cell_m: float,
     points: Points,
@@ -42,9 +47,10 @@ def window_grid(
     radius = float(np.hypot(points[:, 0], points[:, 1]).max())
     turn = cell_m / max(radius, 4.0 * cell_m)
     steps = math.ceil(min(window.reach_rad, math.pi) / turn)
-    offsets = np.arange(-steps, steps + 1)
     # what lies near the guess is tried first: a good score spares much of the rest
-    angles = window.centre[2] + offsets[np.argsort(np.abs(offsets), kind="stable")] * turn
+    offsets = np.arange(1, 2 * steps + 2) // 2
+    offsets[1::2] *= -1
+    angles = window.centre[2] + offsets * turn
     discs = np.zeros((len(angles), 3))
     if barred is not None:
         discs[:, :2] = (barred.pose[:2] - window.centre[:2]) / cell_m

@@ -69,11 +69,15 @@ class Submap:
             )
 
     def likelihood(self, *, cell_m: float, heights: int) -> Likelihood:
-        """What searches look at, for the curves as they stand; kept until they change."""
-        if self._likelihood is None or self._likelihood[0] != len(self.keyframes):
+        """What searches look at, for the curves as they stand; kept until they change.
+
+        The pyramid has `heights` levels, or more where it has been asked for more.
+        """
+        drawn, count = self._likelihood, len(self.keyframes)
+        if drawn is None or drawn[0] != count or len(drawn[1].grids) < heights:
             built = build_likelihood(self.levels[-1], cell_m=cell_m, heights=heights)
-            self._likelihood = (len(self.keyframes), built)
-        return self._likelihood[1]
+            drawn = self._likelihood = (count, built)
+        return drawn[1]
 
     def finish(self) -> None:
         """It will hold no further keyframe: give back what only a growing one needs."""

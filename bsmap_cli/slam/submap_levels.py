@@ -25,16 +25,16 @@ class SubmapLevels(Levels[CurveMap]):
     def __init__(self, settings: MappingSettings) -> None:
         self._settings = settings
         self._levels = [CurveMap(step, settings.degree) for step in settings.ladder]
-        self._waiting: list[tuple[int, CompactClusters, Vector, float]] = []
-        self._inserted = 0
+        self._inserted: list[tuple[CompactClusters, Vector, float]] = []
+        self._drawn = [0] * len(self._levels)  # how many of these each level holds
         self._finished = False
 
     def __len__(self) -> int:
         return len(self._levels)
 
     def _at(self, k: int) -> CurveMap:
-        if self._waiting and k < len(self) - 1:
-            self._draw_waiting()
+        if self._drawn[k] < len(self._inserted):
+            self._draw_waiting(k)
         return self._open(k)
 
     def _open(self, k: int) -> CurveMap:
@@ -55,8 +55,8 @@ class SubmapLevels(Levels[CurveMap]):
                 insert_clusters(level, seen, pose_submap_base, self._settings)
             return
         insert_clusters(self._levels[-1], clusters[-1], pose_submap_base, self._settings)
-        self._waiting.append((self._inserted, packed, pose_submap_base, sigma_m))
-        self._inserted += 1
+        self._inserted.append((packed, pose_submap_base, sigma_m))
+        self._drawn[-1] += 1
 
     def finish(self) -> None:
         """Nothing more will be inserted: what waits is drawn from as few keyframes as it takes.
@@ -72,15 +72,14 @@ class SubmapLevels(Levels[CurveMap]):
             if self._finished and not level.folded:
                 level.fold()
 
-    def _draw_waiting(self) -> None:
-        ladder, fitting = self._settings.ladder, self._settings.fitting
-        apart = [every_nth(step, ladder[-1]) if self._finished else 1 for step in ladder]
-        for n, packed, pose, sigma_m in self._waiting:
-            scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
-            for k in range(len(self) - 1):
-                if n % apart[k] == 0:
-                    insert_clusters(self._open(k), scan[k], pose, self._settings)
-        self._waiting.clear()
+    def _draw_waiting(self, k: int) -> None:
+        ladder, fitting, level = self._settings.ladder, self._settings.fitting, self._open(k)
+        apart = every_nth(ladder[k], ladder[-1]) if self._finished else 1
+        for n in range(self._drawn[k], len(self._inserted)):
+            packed, pose, sigma_m = self._inserted[n]
+            if n % apart == 0:
+                scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
+                insert_clusters(level, scan[k], pose, self._settings)
+        self._drawn[k] = len(self._inserted)
         if self._finished:
-            for level in self._levels[:-1]:
-                level.trim()
+            level.trim()

@@ -252,7 +252,17 @@ def _search(  # noqa: PLR0912
                         break
                     a = children[i, 0]
                     found, fx, fy = descend(
-                        grids, cells[a], places[a], safe[a], FINEST, x, y, reach, best, barred[a]
+                        grids,
+                        cells[a],
+                        places[a],
+                        safe[a],
+                        FINEST,
+                        x,
+                        y,
+                        values[i],
+                        reach,
+                        best,
+                        barred[a],
                     )
                     if found > best:
                         best = reached = found

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.slam import wide_search
-from bsmap_cli.slam.likelihood import CHANNELS, Likelihood, _pyramid, build_likelihood
+from bsmap_cli.slam.likelihood import CHANNELS, Likelihood, _fill_pyramid, build_likelihood
 from bsmap_cli.slam.search_window import Window
 from tests.mapping.walls import new_map
 from tests.slam.rooms import CENTRE, map_of, room_parts, seen_from
@@ -69,7 +69,7 @@ def random_likelihood(random, heights):
     grids = np.zeros((heights, CHANNELS, pad + size + 1, pad + size + 3), np.uint8)
     inside = grids[0, :, pad:, pad:]
     inside[:] = random.integers(0, 256, inside.shape) * (random.random(inside.shape) < 0.2)
-    _pyramid(grids)
+    _fill_pyramid(grids)
     return Likelihood(grids, random.uniform(-1.0, 1.0, 2), 0.1)
 
 
