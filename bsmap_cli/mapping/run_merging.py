@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel
+from bsmap_cli.geometry.compiled import inlined, kernel, part
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.fitting import (
     arc_length_parameters,
@@ -81,7 +81,7 @@ def run_parameters(
             run_u[j] = arc_u[j]
 
 
-@kernel
+@part
 def merge_runs(
     level: LevelArrays,
     matrix: Points,

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
+from bsmap_cli.mapping.compact_clusters import unpacked_scans
 from bsmap_cli.mapping.curve_map import CurveMap
-from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.insertion import draw_scans
 from bsmap_cli.mapping.map_document import MapLevel
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.thaw import thaw_level
@@ -63,16 +64,14 @@ def build_map(
     old : levels that the keyframes go on with, one for each knot step; empty: from nothing.
     sparse : draw coarser levels from as few keyframes as it takes.
     """
-    apart = [every_nth(step, settings.ladder[-1]) if sparse else 1 for step in ladder]
     levels = [thaw_level(level) for level in old]
     levels = levels or [CurveMap(step, settings.degree) for step in ladder]
-    for n, (pose, keyframe) in enumerate(zip(poses, keyframes, strict=True)):
-        fewest = settings.segmentation.faint_points
-        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m, fewest=fewest)
-        clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
-        for k, level in enumerate(levels):
-            if n % apart[k] == 0:
-                insert_clusters(level, clusters[k], pose, settings)
+    packed = [keyframe.clusters for keyframe in keyframes]
+    fewest = settings.segmentation.faint_points
+    for above, level in enumerate(reversed(levels)):
+        apart = every_nth(ladder[-1 - above], settings.ladder[-1]) if sparse else 1
+        scans, at = packed[::apart], poses[::apart]
+        draw_scans(level, scans, at, settings, sigma_m, above=above, fewest=fewest)
     return levels
 
 
@@ -87,8 +86,9 @@ def refine_poses(
     refined = poses.copy()
     ladder = tuple(level.knot_step_m for level in levels)
     prior = isotropic_information((0.3 * ladder[-1], 0.02))
-    for k, keyframe in enumerate(keyframes):
-        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
+    packed = [keyframe.clusters for keyframe in keyframes]
+    scans = unpacked_scans(packed, settings.ladder[-1], sigma_m)
+    for k, finest in enumerate(scans):
         clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
         result = register_near(
             levels,

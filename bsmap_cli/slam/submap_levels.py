@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.curve_map import CurveMap
-from bsmap_cli.mapping.insertion import insert_clusters
+from bsmap_cli.mapping.insertion import draw_scans, insert_clusters
 from bsmap_cli.mapping.levels import Levels
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.slam.keyframes import every_nth
 
@@ -25,7 +26,8 @@ class SubmapLevels(Levels[CurveMap]):
     def __init__(self, settings: MappingSettings) -> None:
         self._settings = settings
         self._levels = [CurveMap(step, settings.degree) for step in settings.ladder]
-        self._inserted: list[tuple[CompactClusters, Vector, float]] = []
+        self._inserted: list[tuple[CompactClusters, Vector]] = []
+        self._sigma_m = 0.0
         self._drawn = [0] * len(self._levels)  # how many of these each level holds
         self._finished = False
 
@@ -55,7 +57,8 @@ class SubmapLevels(Levels[CurveMap]):
                 insert_clusters(level, seen, pose_submap_base, self._settings)
             return
         insert_clusters(self._levels[-1], clusters[-1], pose_submap_base, self._settings)
-        self._inserted.append((packed, pose_submap_base, sigma_m))
+        self._inserted.append((packed, pose_submap_base))
+        self._sigma_m = sigma_m
         self._drawn[-1] += 1
 
     def finish(self) -> None:
@@ -73,13 +76,13 @@ class SubmapLevels(Levels[CurveMap]):
                 level.fold()
 
     def _draw_waiting(self, k: int) -> None:
-        ladder, fitting, level = self._settings.ladder, self._settings.fitting, self._open(k)
+        ladder, level, drawn = self._settings.ladder, self._open(k), self._drawn[k]
         apart = every_nth(ladder[k], ladder[-1]) if self._finished else 1
-        for n in range(self._drawn[k], len(self._inserted)):
-            packed, pose, sigma_m = self._inserted[n]
-            if n % apart == 0:
-                scan = ScanLevels(packed.unpack(ladder[-1], sigma_m), ladder, fitting, sigma_m)
-                insert_clusters(level, scan[k], pose, self._settings)
+        waiting = self._inserted[drawn + -drawn % apart :: apart]
+        if waiting:
+            packed, poses = zip(*waiting, strict=True)
+            above = len(self) - 1 - k
+            draw_scans(level, packed, np.array(poses), self._settings, self._sigma_m, above=above)
         self._drawn[k] = len(self._inserted)
         if self._finished:
             level.trim()
