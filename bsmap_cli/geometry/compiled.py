@@ -9,7 +9,8 @@ compiled without counting (`inlined`, `lean`, `lean_part`) and must not allocate
 
 What only compiled code calls (`inlined`, `part`, `lean_part`) is compiled without the code by
 which Python would call it: for a map level that code is longer than most loops. Called from
-Python, such a function runs as it is written, slowly.
+Python, such a function runs as it is written, slowly. It is not kept on disk by itself: what calls
+it holds it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from typing import Any, TypeVar, cast
 
 from numba import njit, types
 from numba.core.typing.templates import infer_global
+
+from bsmap_cli.geometry.quick_compiler import quick_compilers
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -30,6 +33,8 @@ _RULES = {
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,
 }
+
+_OF_KERNELS, _OF_PARTS = quick_compilers()
 
 PARTS: list[Any] = []
 """What numba made of the parts: it holds them by weak references only."""
@@ -60,13 +65,15 @@ def inlined(function: Function) -> Function:
     return _compile_part(function, _nrt=False, forceinline=True)
 
 
-def _compile(function: Function, **options: bool) -> Function:
-    rules: dict[str, Any] = {**_RULES, **options}
+def _compile(function: Function, **options: Any) -> Function:
+    rules: dict[str, Any] = {**_RULES, "pipeline_class": _OF_KERNELS, **options}
     return cast(Function, njit(**rules)(function))
 
 
 def _compile_part(function: Function, **options: bool) -> Function:
-    compiled = _compile(function, no_cpython_wrapper=True, **options)
+    compiled = _compile(
+        function, no_cpython_wrapper=True, cache=False, pipeline_class=_OF_PARTS, **options
+    )
     PARTS.append(compiled)
     infer_global(function, types.Dispatcher(compiled))  # type: ignore[no-untyped-call]
     return function

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from bsmap_cli.config import load_settings
-from bsmap_cli.geometry.compiled import PARTS
 from bsmap_cli.logs.reader import LogInfo, LogReader, ReadReport
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.queries import MapQuery
@@ -52,8 +51,7 @@ def freshly_compiled() -> int:
 
 
 def compiled_functions() -> Iterator[Any]:
-    """The dispatchers of numba in the modules that are loaded."""
-    yield from PARTS
+    """The dispatchers of numba in the modules that are loaded, apart from parts of others."""
     seen = set()
     for name, module in sorted(sys.modules.items()):
         if name.split(".")[0] != "bsmap_cli":
