@@ -15,7 +15,10 @@ from collections import defaultdict
 from time import process_time
 from typing import Any
 
-from numba.core import event
+CACHE = tempfile.TemporaryDirectory()
+os.environ["NUMBA_CACHE_DIR"] = CACHE.name  # numba reads it when it is imported
+
+from numba.core import event  # noqa: E402
 
 
 class Stopwatch(event.Listener):
@@ -45,13 +48,11 @@ class Stopwatch(event.Listener):
 
 def main() -> int:
     """Run one command in an empty cache and print the table; its exit code."""
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["NUMBA_CACHE_DIR"] = folder
-        stopwatch = Stopwatch()
-        event.register("numba:compile", stopwatch)
-        from bsmap_cli.cli.door import run
+    stopwatch = Stopwatch()
+    event.register("numba:compile", stopwatch)
+    from bsmap_cli.cli.door import run
 
-        code = run(sys.argv[1:] or ["warmup"])
+    code = run(sys.argv[1:] or ["warmup"])
     for name, seconds in sorted(stopwatch.seconds.items(), key=lambda item: -item[1]):
         print(f"{seconds:8.2f} s {stopwatch.variants[name]:4d}  {name}")
     print(f"{sum(stopwatch.seconds.values()):8.2f} s {sum(stopwatch.variants.values()):4d}  in all")
