@@ -104,8 +104,51 @@ def selected_document(selection: Selection) -> MapDocument:
     return replace(selection.document, levels=tuple(levels))
 
 
+def within_box(document: MapDocument, box: Box) -> MapDocument:
+    """The map of the whole curves that reach into the box, on each level."""
+    levels = []
+    for level in document.levels:
+        kept = np.zeros(len(level), bool)
+        kept[clipped(level, drawn_pieces(level), box).curve] = True
+        levels.append(level.only(kept))
+    return replace(document, levels=tuple(levels))
+
+
 def clipped(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:
     """The parts of the pieces that lie within the box, its border included."""
+    inside, crossing = _places_of_curves(level, box)
+    whole, parted = inside[pieces.curve], crossing[pieces.curve]
+    within = DrawnPieces(pieces.curve[whole], pieces.start[whole], pieces.end[whole])
+    cut = _cut(
+        level, DrawnPieces(pieces.curve[parted], pieces.start[parted], pieces.end[parted]), box
+    )
+    curve = np.concatenate((within.curve, cut.curve))
+    order = np.argsort(curve, kind="stable")
+    return DrawnPieces(
+        curve[order],
+        np.concatenate((within.start, cut.start))[order],
+        np.concatenate((within.end, cut.end))[order],
+    )
+
+
+def _places_of_curves(level: MapLevel, box: Box) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which curves lie within the box, and which may cross its border.
+
+    A curve lies among its control points.
+    """
+    x0, y0, x1, y1 = box
+    if not len(level):
+        return np.zeros(0, bool), np.zeros(0, bool)
+    first = level.offsets()[:-1]
+    low = np.minimum.reduceat(level.control_points, first, axis=0)
+    high = np.maximum.reduceat(level.control_points, first, axis=0)
+    inside = np.all((low >= (x0, y0)) & (high <= (x1, y1)), axis=1)
+    reached = np.all((high >= (x0, y0)) & (low <= (x1, y1)), axis=1)
+    return np.asarray(inside), np.asarray(reached & ~inside)
+
+
+def _cut(level: MapLevel, pieces: DrawnPieces, box: Box) -> DrawnPieces:
+    """The same for pieces that may cross the border."""
     counts = np.maximum(np.ceil((pieces.end - pieces.start) / CLIP_STEP), 1).astype(np.int64) + 1
     piece = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)

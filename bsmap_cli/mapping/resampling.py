@@ -36,6 +36,11 @@ def resampled_level(level: MapLevel, knot_step_m: float, degree: int | None = No
     degree : of the new curves; None: as before.
     """
     degree = level.degree if degree is None else degree
+    parts = [_resampled(part, knot_step_m, degree) for _, part in level.portions()]
+    return join_levels(parts) if parts else _resampled(level, knot_step_m, degree)
+
+
+def _resampled(level: MapLevel, knot_step_m: float, degree: int) -> MapLevel:
     matrix = basis_matrix(degree)
     samples = sample_level(level, min(level.knot_step_m, knot_step_m) / SAMPLES_PER_STEP)
     u = samples.tau_m / knot_step_m

@@ -10,6 +10,7 @@ from bsmap_cli.errors import TrackingError
 from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.pipeline.feed import Feed, Progress, Silent
+from bsmap_cli.pipeline.memory_needed import refuse_too_large
 from bsmap_cli.sensor.trajectory import Trajectory
 from bsmap_cli.slam.localization import Localizer
 
@@ -36,7 +37,9 @@ def run_localize(
     LogError : the log holds no usable scan.
     MapFileError : the map draws nothing.
     TrackingError : no place in the map fits the scans, or none is the only one that does.
+    UsageError : there is not memory enough for a map so large.
     """
+    refuse_too_large(document)
     localizer = Localizer(document, settings)
     feed = Feed(reader, progress or Silent())
     for scan in feed:

@@ -21,6 +21,7 @@ from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
+from bsmap_cli.pipeline.memory_needed import refuse_too_large
 from bsmap_cli.sensor.pose_track import PoseTrack
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.trajectory import Trajectory
@@ -114,6 +115,7 @@ def run_slam(
     TrackingError : the log has no place in the old map, or more than one.
     MapFileError : the old map draws nothing.
     ConfigError : the settings keep the map as tracking built it, beside which no old one fits.
+    UsageError : there is not memory enough for an old map so large.
     """
     progress = progress or Silent()
     feed = Feed(reader, progress)
@@ -124,6 +126,7 @@ def run_slam(
                 "final_map.rebuild: false does not go with an old map: the old and the new part "
                 "become one when the map is built anew; leave it out, or set it to true"
             )
+        refuse_too_large(old)
         settings = settings_for_map(settings, old)
         known = KnownMap(old, _settings_for(SlamSettings, settings))
     slam = Slam(_settings_for(SlamSettings, settings), known)

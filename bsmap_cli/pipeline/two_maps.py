@@ -18,9 +18,11 @@ from bsmap_cli.mapping.fusion import fuse_level
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.resampling import one_level, resampled_level
 from bsmap_cli.mapping.thaw import thaw_level
+from bsmap_cli.pipeline.memory_needed import refuse_beyond_memory
 from bsmap_cli.slam.known_map import settings_for_map
 from bsmap_cli.slam.map_placing import MapPlacer, Placement
 
+BYTES_EACH = 850.0  # that placing a map takes for each control point of both
 SUMS = ("scans", "scans_used", "travelled_m")  # of the description, where both maps have them
 
 
@@ -33,7 +35,10 @@ def place_map(
     ------
     MapFileError : one of the maps draws nothing.
     TrackingError : no place fits, or more than one.
+    UsageError : there is not memory enough for maps so large.
     """
+    points = sum(len(level.weights) for each in (a, b) for level in each.chosen_levels())
+    refuse_beyond_memory(points, BYTES_EACH, "laying maps over each other that have")
     placer = MapPlacer(a, b, settings)
     if at is not None:
         return placer.near(at)

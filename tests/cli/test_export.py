@@ -105,8 +105,17 @@ def test_a_clip_leaves_less(here):
     assert counts[1] < counts[0]
 
 
-def test_a_box_beside_the_map_is_said_to_be_empty(here):
-    ran = bsmap("export", "map.bsm", "-o", "x.svg", "--clip", "900,900,901,901", cwd=here)
+def test_a_clipped_map_is_a_map(here):
+    ran = bsmap("export", "map.bsm", "-o", "part.bsm", "--clip", "0,0,1,9", cwd=here)
+    assert ran.returncode == 0
+    assert bsmap("stats", "part.bsm", cwd=here).returncode == 0
+    part, whole = ((here / name).stat().st_size for name in ("part.bsm", "map.bsm"))
+    assert part < whole
+
+
+@pytest.mark.parametrize("out", ["x.svg", "x.bsm"])
+def test_a_box_beside_the_map_is_said_to_be_empty(out, here):
+    ran = bsmap("export", "map.bsm", "-o", out, "--clip", "900,900,901,901", cwd=here)
     assert ran.returncode == 0
     assert "nothing is drawn" in message(ran)
     assert (

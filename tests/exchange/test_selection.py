@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from bsmap_cli.exchange.bezier import bezier_pieces
 from bsmap_cli.exchange.flatten import polylines, simplified
-from bsmap_cli.exchange.selection import select
+from bsmap_cli.exchange.selection import select, within_box
 from bsmap_cli.mapping.sampling import evaluate, sample_level
 from tests.exchange.exported import assert_same_lines, distances, drawn_lines, wavy_document
 
@@ -54,6 +54,16 @@ def test_a_box_beside_everything_leaves_nothing():
     (cut,) = select(wavy_document(), clip=(0, 0, 1, 1)).levels
     assert len(cut.pieces.curve) == 0
     assert polylines(cut) == bezier_pieces(cut) == []
+
+
+def test_a_map_within_a_box_has_the_whole_curves_that_reach_into_it():
+    document = wavy_document(levels=(0.2, 0.1))
+    box = (-13.5, 32.9, -12.5, 33.5)  # the lower end of the straight
+    for level, whole in zip(within_box(document, box).levels, document.levels, strict=True):
+        assert len(level) == 1
+        (row,) = np.flatnonzero(whole.curve_ids == level.curve_ids)
+        begin, end = whole.offsets()[row : row + 2]
+        np.testing.assert_array_equal(level.control_points, whole.control_points[begin:end])
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 5])

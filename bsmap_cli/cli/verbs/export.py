@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # which formats an option means something to
 TAKERS: dict[str, tuple[MapFormat, ...]] = {
     "--level": ("svg", "png", "geojson", "dxf", "yaml", "csv", "ply", "mcap", "bsm"),
-    "--clip": ("svg", "png", "geojson", "dxf", "yaml", "csv", "ply", "mcap"),
+    "--clip": ("svg", "png", "geojson", "dxf", "yaml", "csv", "ply", "mcap", "bsm"),
     "--traj": ("svg", "png", "dxf", "yaml", "mcap"),
     "--resolution": ("png", "yaml"),
     "--simplify": ("geojson", "mcap"),
@@ -31,6 +31,8 @@ TAKERS: dict[str, tuple[MapFormat, ...]] = {
     "--compress": ("bsm",),
     "--log": ("mcap",),
 }
+
+EMPTY = "nothing is drawn: the map, or what --clip leaves of it, is empty"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +102,8 @@ def run(
       json     all of the map; `bsmap` reads it back
       ply      samples with normals, for point cloud viewers
       mcap     line strips, path and grid, for Foxglove; with --log and --traj a replay
-      bsm      the map file itself: one level of it, compressed, or back from json
+      bsm      the map file itself: one level of it, the curves that reach into a box,
+               compressed, or back from json
 
     \b
     Example:
@@ -118,7 +121,7 @@ def run(
         image = _image_beside(outputs, output) if kind == "yaml" else None
         document, _ = read_map_file(source)
         if kind == "bsm":
-            _write_bsm(target, document, part)
+            _write_bsm(target, document, part, voice)
         elif kind == "json":
             from bsmap_cli.exchange.map_json import write_map_json
 
@@ -126,7 +129,7 @@ def run(
         else:
             selection = _selection(document, part)
             if selection.is_empty and kind not in ("yaml", "png"):  # which refuse it
-                voice.warn("nothing is drawn: the map, or what --clip leaves of it, is empty")
+                voice.warn(EMPTY)
             if image is not None:
                 _write_nav2(target, image, selection, part)
             elif kind == "mcap":
@@ -174,11 +177,17 @@ def _origin(text: str | None) -> GeoOrigin | None:
     return None if text is None else GeoOrigin(*numbers("--origin", text, "48.137,11.575,30"))
 
 
-def _write_bsm(target: Output, document: MapDocument, part: PartFlags) -> None:
+def _write_bsm(target: Output, document: MapDocument, part: PartFlags, talk: Talk) -> None:
     from bsmap_cli.mapping.map_file import write_map
 
     if part.level is not None:
         document = replace(document, levels=document.chosen_levels(part.level), parts=False)
+    if (clip := box(part.clip)) is not None:
+        from bsmap_cli.exchange.selection import within_box
+
+        document = within_box(document, clip)
+        if not any(map(len, document.levels)):
+            talk.warn(EMPTY)
     write_map(target.open(), document, compress=part.compress)
 
 
