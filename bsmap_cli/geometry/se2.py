@@ -38,7 +38,8 @@ class SE2(NamedTuple):
     @classmethod
     def from_array(cls, xytheta: Iterable[float]) -> SE2:
         """From three numbers x [m], y [m], theta [rad]; theta is wrapped."""
-        x, y, theta = (float(value) for value in xytheta)
+        known = xytheta.tolist() if isinstance(xytheta, np.ndarray) else xytheta
+        x, y, theta = map(float, known)
         return cls(x, y, wrap_angle(theta))
 
     def as_array(self) -> Vector:

@@ -17,7 +17,7 @@ from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import Likelihood
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.recovery import CELL_STEPS
-from bsmap_cli.slam.registration import RegistrationResult
+from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings
 from bsmap_cli.slam.search_window import Window, heights_for
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
@@ -25,8 +25,8 @@ from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 from bsmap_cli.slam.viewpoints import Viewpoints, median_range
 from bsmap_cli.slam.wide_search import search
 
-HEIGHTS = 6  # of the likelihood pyramid at most: blocks of 32 cells at the top
-DRAWN = 24  # likelihoods of submaps that are kept for the next search
+LEAST_HEIGHTS, HEIGHTS = 5, 6  # of a likelihood pyramid: blocks of 16 or 32 cells at the top
+DRAWN = 32  # likelihoods of submaps that are kept for the next search
 OPEN = 48  # submaps that stay open for the next registration
 DIRECT_STEPS = 3.0  # up to this uncertainty the ladder alone finds a place
 REFINED = 2  # levels, from the finest up, that draw in what a search leaves: less than its cell
@@ -86,55 +86,57 @@ class LoopCloser:
     _open: dict[int, Submap] = field(default_factory=dict)
     _viewpoints: Viewpoints = field(default_factory=Viewpoints)
     _travelled_m: float = 0.0
+    _refining: RegistrationSettings = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._refining = self.local.settings.registration.far_off()
 
     def process(self, keyframe: Keyframe) -> None:
         """Search the nearby old submaps for one keyframe."""
         if keyframe.index:
             before = self.local.keyframes[keyframe.index - 1].pose_local
-            step = before.inverse() @ keyframe.pose_local
+            step = keyframe.pose_local.relative_to(before)
             self._travelled_m += math.hypot(step.x, step.y)
         self.graph.update()
-        candidates = self._candidates(keyframe)
+        submap = self.local.submaps[keyframe.submap]
+        here = self.graph.pose(submap.index) @ submap.to_submap(keyframe.pose_local)
+        candidates = self._candidates(keyframe, here)
         if not candidates:
             return
-        finest = keyframe.clusters.unpack(self.local.settings.ladder[-1], self.local.sigma_m)
-        settings = self.local.settings
-        clusters = ScanLevels(finest, settings.ladder, settings.fitting, self.local.sigma_m)
+        settings, sigma_m = self.local.settings, self.local.sigma_m
+        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
+        clusters = ScanLevels(finest, settings.ladder, settings.fitting, sigma_m)
         for submap, reach_m, reach_rad in candidates:
-            self._try(keyframe, clusters, submap, reach_m, reach_rad)
+            guess = here.relative_to(self.graph.pose(submap.index)).as_array()
+            self._try(keyframe, clusters, submap, Window(guess, reach_m, reach_rad))
 
-    def _pose_map(self, keyframe: Keyframe) -> SE2:
-        submap = self.local.submaps[keyframe.submap]
-        return self.graph.pose(submap.index) @ submap.to_submap(keyframe.pose_local)
-
-    def _candidates(self, keyframe: Keyframe) -> list[tuple[Submap, float, float]]:
+    def _candidates(self, keyframe: Keyframe, here: SE2) -> list[tuple[Submap, float, float]]:
         """The finished submaps that most likely see what the keyframe sees, nearest first."""
         unit, settings = self.local.settings.ladder[-1], self.local.settings.loops
         count = max(0, keyframe.submap - 1)
-        if count == 0:
+        # round and round the same way ever more submaps hold the place: the nearest will do
+        most = min(settings.tries, keyframe.index - self.tried)
+        if count == 0 or most <= 0:
             return []
         self._remember(count)
         metres, radians = self.graph.deviations_from(keyframe.submap)
-        here = self._pose_map(keyframe)
         view_m = median_range(keyframe.clusters.points)
         reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
-        due = self._next_try[:count] <= self._travelled_m
-        distances = self._viewpoints.distances(
-            self.graph.poses, here.x, here.y, np.where(due, view_m + reach_m, 0.0)
-        )
-        wide = due & (distances < view_m + reach_m) & (reach_m > WIDE_STEPS * unit)
-        if wide.any():
+        waits = self._next_try[:count] > self._travelled_m
+        away = self._viewpoints.away(self.graph.poses, here, view_m, reach_m, waits)
+        if (
+            reach_m.max() > WIDE_STEPS * unit
+            and ((away < 1.0) & (reach_m > WIDE_STEPS * unit)).any()
+        ):
             far_m = self.graph.far_deviations_from(keyframe.submap)[:count]
             widest_m = np.maximum(settings.deviations * far_m, WIDE_STEPS * unit)
             reach_m = np.minimum(reach_m, widest_m)
-        within = view_m + reach_m
-        found = np.flatnonzero(due & (distances < within))
-        nearest = found[np.argsort(distances[found] / within[found], kind="stable")]
-        # round and round the same way ever more submaps hold the place: the nearest will do
-        most = min(settings.tries, keyframe.index - self.tried)
+            away = self._viewpoints.away(self.graph.poses, here, view_m, reach_m, waits)
+        nearest = np.argsort(away, kind="stable")[:most].tolist()
         return [
             (self.local.submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
-            for k in nearest[:most].tolist()
+            for k in nearest
+            if away[k] < 1.0
         ]
 
     def _remember(self, count: int) -> None:
@@ -148,21 +150,18 @@ class LoopCloser:
         keyframe: Keyframe,
         clusters: Sequence[Clusters],
         submap: Submap,
-        reach_m: float,
-        reach_rad: float,
+        window: Window,
     ) -> None:
         """Search, refine, judge; a closure from far off waits for a second that agrees."""
         settings = self.local.settings
-        unit = settings.ladder[-1]
+        unit, reach_m = settings.ladder[-1], window.reach_m
         self.tried += 1
         # the wider the search, the more submaps wait for theirs, and the longer a loop may take
         again_m = max(settings.loops.retry * unit, RETRY_SHARE * reach_m)
         self._next_try[submap.index] = self._travelled_m + again_m
-        guess = (self.graph.pose(submap.index).inverse() @ self._pose_map(keyframe)).as_array()
         folded = _oldest(self._open, submap, OPEN)
         if folded:
             folded.fold()
-        window = Window(guess, reach_m, reach_rad)
         coarse = clusters[max(0, len(clusters) - 2)]
         likelihood = self._likelihood(submap, window)
         floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
@@ -176,7 +175,7 @@ class LoopCloser:
             peak.pose,
             isotropic_information((0.5 * DIRECT_STEPS * unit, 0.1)),
             sigma_m=self.local.sigma_m,
-            settings=settings.registration.far_off(),
+            settings=self._refining,
         )
         if not self._good(result, unit) or result.inlier_ratio < KEPT * keyframe.explained:
             return
@@ -210,8 +209,8 @@ class LoopCloser:
         if forgotten:
             forgotten.forget_likelihood()
         cell_m = CELL_STEPS * self.local.settings.ladder[-1]
-        heights = min(HEIGHTS, heights_for(math.ceil(window.reach_m / cell_m)))
-        return submap.likelihood(cell_m=cell_m, heights=heights)
+        heights = max(LEAST_HEIGHTS, heights_for(math.ceil(window.reach_m / cell_m)))
+        return submap.likelihood(cell_m=cell_m, heights=min(HEIGHTS, heights))
 
     def _good(self, result: RegistrationResult, unit_m: float) -> bool:
         settings = self.local.settings.loops

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.slam.edges import Integers
 from bsmap_cli.slam.submap import Submap
 
@@ -16,26 +16,29 @@ EVERY = 4  # a viewpoint of so many is kept: keyframes lie close together
 
 
 @kernel
-def _nearest(
+def _ways(
     poses: Points,
     x: float,
     y: float,
     extents_m: Vector,
     points: Points,
     starts: Integers,
-    within_m: Vector,
-    distances: Vector,
+    view_m: float,
+    reach_m: Vector,
+    waits: NDArray[np.bool_],
+    away: Vector,
 ) -> None:
-    for k in range(len(distances)):
-        distances[k] = math.inf
+    for k in range(len(away)):
+        away[k] = math.inf
+        within = view_m + reach_m[k]
         dx, dy = x - poses[k, 0], y - poses[k, 1]
-        if math.hypot(dx, dy) > extents_m[k] + within_m[k]:
+        if waits[k] or math.hypot(dx, dy) > extents_m[k] + within:
             continue
         cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
         seen_x, seen_y = cos * dx + sin * dy, cos * dy - sin * dx
         for p in range(starts[k], starts[k + 1]):
-            away = math.hypot(points[p, 0] - seen_x, points[p, 1] - seen_y)
-            distances[k] = min(distances[k], away)
+            way = math.hypot(points[p, 0] - seen_x, points[p, 1] - seen_y)
+            away[k] = min(away[k], way / within)
 
 
 def median_range(points: NDArray[np.float32]) -> float:
@@ -67,11 +70,15 @@ class Viewpoints:
         self._points = np.concatenate((self._points, seen_from))
         self._starts = np.append(self._starts, len(self._points))
 
-    def distances(self, poses: Points, x: float, y: float, within_m: Vector) -> Vector:
-        """(n,) way [m] from (x, y) to the nearest viewpoint of each submap; inf far beyond reach.
+    def away(
+        self, poses: Points, here: SE2, view_m: float, reach_m: Vector, waits: NDArray[np.bool_]
+    ) -> Vector:
+        """(n,) way from here to the nearest viewpoint of each submap, as a share of what matters.
 
-        poses : (n, 3) of the submaps in the frame of x and y. within_m : (n,) how far anyone asks.
+        That is how far one sees from here and how far the submap may lie off; inf far beyond it,
+        and for those that wait. poses : (n, 3) of the submaps in the frame of `here`.
         """
-        found = np.empty(len(within_m))
-        _nearest(poses, x, y, self._extents_m, self._points, self._starts, within_m, found)
+        found = np.empty(len(reach_m))
+        extents, points, starts = self._extents_m, self._points, self._starts
+        _ways(poses, here.x, here.y, extents, points, starts, view_m, reach_m, waits, found)
         return found
