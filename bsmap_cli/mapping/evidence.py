@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import kernel, lean
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -119,7 +119,7 @@ def _recall(level: LevelArrays, degree: int, curves: int, leaving: float, tally:
             tally.hits[row] += earlier
 
 
-@kernel
+@lean
 def _count_hits(look: Look, tally: Tally) -> None:
     """From where each span returns a beam: a glass pane does so only along its normal."""
     for i in range(len(look.rows)):
@@ -130,7 +130,7 @@ def _count_hits(look: Look, tally: Tally) -> None:
             tally.farthest_m[row] = max(tally.farthest_m[row], look.ranges_m[i])
 
 
-@kernel
+@lean
 def _weigh(
     look: Look, reach_m: float, tally: Tally, leaving: float, arriving: float, tentative: int
 ) -> None:

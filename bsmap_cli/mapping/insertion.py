@@ -71,14 +71,14 @@ def _place_and_plan(
 ) -> int:
     """Place the scan, eq. (2), match its points and cut it into runs; their number."""
     n = len(points_body)
-    points, tangents = room.points[:n], room.tangents[:n]
+    points, tangents, u = room.points[:n], room.tangents[:n], room.u[:n]
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     for j in range(n):
         points[j, 0] = cos * points_body[j, 0] - sin * points_body[j, 1] + pose[0]
         points[j, 1] = sin * points_body[j, 0] + cos * points_body[j, 1] + pose[1]
         tangents[j, 0] = cos * tangents_body[j, 0] - sin * tangents_body[j, 1]
         tangents[j, 1] = sin * tangents_body[j, 0] + cos * tangents_body[j, 1]
-        room.u[j] = 0.0
+        u[j] = 0.0
     polynomial = np.empty((matrix.shape[0], 2))
     match_points(
         level,
@@ -89,10 +89,10 @@ def _place_and_plan(
         starts,
         gate_m,
         room.curves,
-        room.u,
+        u,
         polynomial,
     )
-    return plan_runs(level, points, starts, room.curves, room.u, knot_step_m, least, room.runs)
+    return plan_runs(level, points, starts, room.curves, u, knot_step_m, least, room.runs)
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import inlined, kernel, part
+from bsmap_cli.geometry.compiled import inlined, lean, lean_part
 from bsmap_cli.geometry.se2 import Points, Vector, wrap_angle
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -38,7 +38,8 @@ class Fan(NamedTuple):
     """The beams of one scan in the map frame.
 
     x, y, first_rad : the laser and the bearing of its first beam; turn_cos, turn_sin : of the
-    step from one beam to the next; circle : beams of a whole turn; farthest : see there.
+    step from one beam to the next; circle : beams of a whole turn; farthest : (WIDTHS, SECTORS) the
+    longest beam within 2^w sectors to either side, -1 without any.
     """
 
     x: float
@@ -77,10 +78,11 @@ def _sector(x: float, y: float) -> int:
     return min(SECTORS - 1, int(turn * (SECTORS / 4.0)))
 
 
-@part
-def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
-    """(WIDTHS, SECTORS) the longest beam within 2^w sectors to either side; -1 without any."""
-    farthest, sectors = np.empty((WIDTHS, SECTORS)), np.empty(SECTORS)
+@lean_part
+def _find_farthest(
+    first_rad: float, step_rad: float, ranges: Ranges, sectors: Vector, farthest: Points
+) -> None:
+    """Write the longest beam in each of the sectors, and within 2^w of them to either side."""
     for s in range(SECTORS):
         sectors[s] = -1.0
     cos, sin = math.cos(first_rad), math.sin(first_rad)
@@ -97,10 +99,9 @@ def _farthest(first_rad: float, step_rad: float, ranges: Ranges) -> Points:
         for s in range(SECTORS):
             left, right = farthest[w - 1, s - reach], farthest[w - 1, (s + reach) % SECTORS]
             farthest[w, s] = max(left, right)
-    return farthest
 
 
-@part
+@lean_part
 def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     """Does any beam come near a part of a curve that lies round (x, y)?"""
     vx, vy = x - fan.x, y - fan.y
@@ -116,7 +117,7 @@ def _in_sight(x: float, y: float, radius_m: float, fan: Fan) -> bool:
     return bool(fan.farthest[w, _sector(vx, vy)] > r - 2.0 * radius_m)
 
 
-@part
+@lean_part
 def _judge_beams(
     fan: Fan,
     centre: float,
@@ -163,7 +164,7 @@ def _judge_beams(
     return DARK if dark > 0 else UNSEEN
 
 
-@part
+@lean_part
 def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[int, float, float]:
     """UNSEEN, HIT, MISS or DARK; cosine of the incidence; distance [m]."""
     vx, vy = spans[row, 0] - fan.x, spans[row, 1] - fan.y
@@ -193,7 +194,7 @@ def _judge_span(spans: Points, row: int, fan: Fan, knot_step_m: float) -> tuple[
     return verdict, cosine, r
 
 
-@kernel
+@lean
 def _judge_level(
     level: LevelArrays,
     degree: int,
@@ -203,10 +204,12 @@ def _judge_level(
     ranges: Ranges,
     reach_m: float,
     sigma_m: float,
+    sectors: Vector,
+    farthest: Points,
     look: Look,
 ) -> int:
     """Judge all spans that the beams may reach, and write of how many; laser as in `Fan`."""
-    farthest = _farthest(laser[2], step_rad, ranges)
+    _find_farthest(laser[2], step_rad, ranges, sectors, farthest)
     fan = Fan(
         laser[0],
         laser[1],
@@ -267,6 +270,8 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
         sight.ranges_m,
         sight.reach_m,
         sigma_m,
+        np.empty(SECTORS),
+        np.empty((WIDTHS, SECTORS)),
         room,
     )
     return Look(

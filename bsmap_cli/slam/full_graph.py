@@ -46,23 +46,19 @@ def solve_full_graph(
     nodes_of_submaps = first + count
     # the keyframes that two submaps share err alike: together they count as one observation
     shared = max(1, local.settings.submaps.keyframes // 2)
+    informations = np.array([frame.information for frame in keyframes])
+    told = np.any(informations, axis=(1, 2))
+    matched = match_information(informations, unit) / shared
+    near = isotropic_information(way_deviation(0.0, unit)) / shared
     edges = EdgeList()
     for submap in submaps:
         for k in submap.keyframes:
-            if k != submap.keyframes[0] and not np.any(keyframes[k].information):
+            if k != submap.keyframes[0] and not told[k]:
                 continue  # it coasted, and lies in the submap no better than its neighbours know
             pose = submap.to_submap(keyframes[k].pose_local)
-            if keyframes[k].submap == submap.index and np.any(keyframes[k].information):
-                information = match_information(keyframes[k].information, unit)
-            else:
-                information = isotropic_information(way_deviation(0.0, unit))
-            edges.add(
-                nodes_of_submaps + submap.index,
-                first + k,
-                pose.as_array(),
-                information / shared,
-                loop=False,
-            )
+            information = matched[k] if keyframes[k].submap == submap.index and told[k] else near
+            node = nodes_of_submaps + submap.index
+            edges.add(node, first + k, pose.as_array(), information, loop=False)
     for k in range(1, count):
         step = keyframes[k].pose_local.relative_to(keyframes[k - 1].pose_local)
         way = math.hypot(step.x, step.y)

@@ -13,10 +13,10 @@ FLOOR_STEPS, FLOOR_RAD = 0.4, 0.006  # what no registration goes below: the bend
 
 
 def match_information(hessian: Points, knot_step_m: float) -> Points:
-    """Inverse covariance of a registered pose, with a floor under the deviations.
+    """(..., 3, 3) inverse covariance of registered poses, with a floor under the deviations.
 
-    hessian : (3, 3) of the data; the data alone are far too sure of themselves, as the errors of
-    map and scan do not average out.
+    hessian : (..., 3, 3) of the data; the data alone are far too sure of themselves, as the errors
+    of map and scan do not average out.
     """
     tiny = _diagonal(1e-4 / knot_step_m**2, 1e-2)
     floor = _diagonal((FLOOR_STEPS * knot_step_m) ** 2, FLOOR_RAD**2)
