@@ -74,6 +74,18 @@ def _compile_part(function: Function, **options: bool) -> Function:
     compiled = _compile(
         function, no_cpython_wrapper=True, cache=False, pipeline_class=_OF_PARTS, **options
     )
-    PARTS.append(compiled)
+    PARTS.append(_for_any_number(compiled))
     infer_global(function, types.Dispatcher(compiled))  # type: ignore[no-untyped-call]
     return function
+
+
+def _for_any_number(compiled: Any) -> Any:
+    """Called with a literal, it is what it is for other numbers, and no variant of its own."""
+    resolve = compiled.get_call_template
+
+    def resolve_numbers(args: Any, kws: Any) -> Any:
+        named = {name: types.unliteral(value) for name, value in kws.items()}
+        return resolve(tuple(types.unliteral(value) for value in args), named)
+
+    compiled.get_call_template = resolve_numbers
+    return compiled

@@ -19,6 +19,7 @@ _compiler: Any = import_module("numba.core.compiler")
 _machinery: Any = import_module("numba.core.compiler_machinery")
 _lowering: Any = import_module("numba.core.typed_passes").NativeLowering
 _library: Any = import_module("numba.core.codegen").JITCodeLibrary
+_stack: Any = import_module("numba.core.targetconfig").ConfigStack
 _function: Any = import_module("numba.core.types.functions").BaseFunction
 
 NEEDLESS = {
@@ -122,8 +123,10 @@ def _typing_remembered() -> Iterator[None]:
         key = (id(self), id(context), args, tuple(kws.items()))
         known = _resolved.get(key)
         if known is None:
+            with _stack().enter(_rules_of_all()):
+                found = resolve(self, context, args, kws)
             # with the function itself, so that its id is not given to another one
-            known = _resolved[key] = (resolve(self, context, args, kws), (self, context))
+            known = _resolved[key] = (found, (self, context))
         return known[0]
 
     if resolve.__name__ == resolve_once.__name__:
@@ -134,6 +137,17 @@ def _typing_remembered() -> Iterator[None]:
         yield
     finally:
         _function.get_call_type = resolve
+
+
+def _rules_of_all() -> Any:
+    """The rules by which a kernel is compiled, without those that its callers make.
+
+    What it calls of numba is compiled once for each set of rules.
+    """
+    rules = _stack.top_or_none().copy()
+    for rule in ("no_cpython_wrapper", "forceinline"):
+        rules.discard(rule)
+    return rules
 
 
 @contextmanager
