@@ -83,9 +83,11 @@ def _for_any_number(compiled: Any) -> Any:
     """Called with a literal, it is what it is for other numbers, and no variant of its own."""
     resolve = compiled.get_call_template
 
+    unliteral: Any = types.unliteral
+
     def resolve_numbers(args: Any, kws: Any) -> Any:
-        named = {name: types.unliteral(value) for name, value in kws.items()}
-        return resolve(tuple(types.unliteral(value) for value in args), named)
+        named = {name: unliteral(value) for name, value in kws.items()}
+        return resolve(tuple(unliteral(value) for value in args), named)
 
     compiled.get_call_template = resolve_numbers
     return compiled
