@@ -43,8 +43,8 @@ def _lower_weights(level: LevelArrays, degree: int, look: Look, gone: NDArray[np
     for verdict in (MISS, HIT):
         for i in range(len(look.rows)):
             if look.verdicts[i] == verdict:
-                row = look.rows[i]
-                seen[row : row + degree + 1] = verdict
+                for row in range(look.rows[i], look.rows[i] + degree + 1):
+                    seen[row] = verdict
     found = False
     for i in range(len(look.rows)):
         for row in range(look.rows[i], look.rows[i] + degree + 1):

@@ -192,7 +192,7 @@ def average_in(
         old, new = level.weights[row], weights[i]
         total = old + new
         if total <= 0.0:
-            level.points[row] = fitted[i]
+            level.points[row, 0], level.points[row, 1] = fitted[i, 0], fitted[i, 1]
             continue
         for axis in range(2):
             gain = new / total if old > 0.0 else 1.0
