@@ -93,8 +93,8 @@ def remove_unseen(
         _count_hits(look, tally)
         looks.append(look)
     _recall(arrays, curve_map.degree, old_curves, settings.leaving, tally)
-    for (sight, _), look in zip(views, looks, strict=True):
-        _weigh(look, sight.reach_m, tally, settings.leaving, settings.arriving, settings.tentative)
+    for look in looks:
+        _weigh(look, tally, settings.leaving, settings.arriving, settings.tentative)
     absent, gone = np.zeros(rows, bool), np.zeros(rows, bool)
     _find_absent(arrays, curve_map.degree, tally.score, settings.leaving, absent)
     if _gone_points(arrays, curve_map.degree, absent, gone):
@@ -131,9 +131,7 @@ def _count_hits(look: Look, tally: Tally) -> None:
 
 
 @lean
-def _weigh(
-    look: Look, reach_m: float, tally: Tally, leaving: float, arriving: float, tentative: int
-) -> None:
+def _weigh(look: Look, tally: Tally, leaving: float, arriving: float, tentative: int) -> None:
     """Let one view change the scores."""
     for i in range(len(look.rows)):
         row, verdict = look.rows[i], look.verdicts[i]
@@ -143,7 +141,7 @@ def _weigh(
         cosine, r = look.cosines[i], look.ranges_m[i]
         counts = cosine >= tally.least_cosine[row] and r <= tally.farthest_m[row]
         if tally.hits[row] < tentative:
-            sure = cosine >= DARK_COSINE and r <= DARK_RANGE * reach_m
+            sure = cosine >= DARK_COSINE and r <= DARK_RANGE * look.reach_m
             counts = counts or verdict == MISS or sure
         if counts:
             miss = DARK_MISS if verdict == DARK else 1.0

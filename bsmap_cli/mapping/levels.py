@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeVar, overload
 
 Level = TypeVar("Level")
@@ -21,6 +21,9 @@ class Levels(Sequence[Level]):
     def __getitem__(self, index: int | slice) -> Level | list[Level]:
         places = range(len(self))[index]
         return self._at(places) if isinstance(places, int) else [self._at(k) for k in places]
+
+    def __iter__(self) -> Iterator[Level]:
+        return map(self._at, range(len(self)))
 
     @abstractmethod
     def _at(self, k: int) -> Level:

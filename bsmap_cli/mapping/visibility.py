@@ -59,12 +59,14 @@ class Look(NamedTuple):
     """What one scan shows of a map: the spans of which it tells anything, by row.
 
     verdicts : HIT, MISS or DARK; cosines : of the incidence; ranges_m : distance of the span.
+    reach_m : of the longest beam that came back.
     """
 
     rows: NDArray[np.int32]
     verdicts: NDArray[np.int8]
     cosines: NDArray[np.float32]
     ranges_m: NDArray[np.float32]
+    reach_m: float
 
 
 @inlined
@@ -260,6 +262,7 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
         np.empty(most, np.int8),
         np.empty(most, np.float32),
         np.empty(most, np.float32),
+        sight.reach_m,
     )
     count = _judge_level(
         curve_map.arrays,
@@ -268,7 +271,7 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
         laser,
         sight.beam_step_rad,
         sight.ranges_m,
-        sight.reach_m,
+        room.reach_m,
         sigma_m,
         np.empty(SECTORS),
         np.empty((WIDTHS, SECTORS)),
@@ -279,4 +282,5 @@ def look_at(curve_map: CurveMap, sight: Sight, pose_map_body: Vector, sigma_m: f
         room.verdicts[:count].copy(),
         room.cosines[:count].copy(),
         room.ranges_m[:count].copy(),
+        room.reach_m,
     )

@@ -82,6 +82,8 @@ class SubmapLevels(Levels[CurveMap]):
         if waiting:
             packed, poses = zip(*waiting, strict=True)
             above = len(self) - 1 - k
+            # one size for all that comes, where nothing more does: growing costs more than drawing
+            level.reserve(len(self._levels[-1].arrays.weights) if self._finished else 0)
             draw_scans(level, packed, np.array(poses), self._settings, self._sigma_m, above=above)
         self._drawn[k] = len(self._inserted)
         if self._finished:
