@@ -10,7 +10,7 @@ from bsmap_cli.mapping.map_document import MapDocument
 
 CONTROL_GROUP = Path("/sys/fs/cgroup/memory.max")
 MOST = 0.5  # of the memory there is: other programs need theirs
-SEARCHED_BYTES_EACH = 500.0  # for each control point of a map that scans are matched against
+SEARCHED_BYTES_EACH = 600.0  # for each control point of a map that scans are matched against
 
 
 def refuse_too_large(document: MapDocument) -> None:

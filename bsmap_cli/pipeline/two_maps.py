@@ -22,7 +22,7 @@ from bsmap_cli.pipeline.memory_needed import refuse_beyond_memory
 from bsmap_cli.slam.known_map import settings_for_map
 from bsmap_cli.slam.map_placing import MapPlacer, Placement
 
-BYTES_EACH = 850.0  # that placing a map takes for each control point of both
+BYTES_EACH = 900.0  # that placing a map takes for each control point of both
 SUMS = ("scans", "scans_used", "travelled_m")  # of the description, where both maps have them
 
 
