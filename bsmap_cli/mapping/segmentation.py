@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import lean
+from bsmap_cli.geometry.compiled import kernel, lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.continuity import BEAM_GAPS, GapRule, cut_surfaces
 from bsmap_cli.mapping.least_surface import LeastSurface
@@ -89,10 +89,15 @@ class Clusters:
         knot_step_m: float,
         sigma_m: float,
     ) -> Clusters:
-        """Add the direction of the surface, taken over a length well beyond the noise."""
+        """Add the direction of the surface."""
         tangents = np.empty_like(points)
-        _tangents(points, starts, max(0.5 * knot_step_m, 6.0 * sigma_m), tangents)
+        _tangents(points, starts, _reach_m(knot_step_m, sigma_m), tangents)
         return cls(points, tangents, counts, starts)
+
+
+def _reach_m(knot_step_m: float, sigma_m: float) -> float:
+    """Over how much of a surface its direction is taken: well beyond the noise."""
+    return max(0.5 * knot_step_m, 6.0 * sigma_m)
 
 
 @lean
@@ -150,6 +155,29 @@ def _tangents(points: Points, starts: NDArray[np.int64], reach_m: float, tangent
             tangents[i, 1] = dy / norm
 
 
+@kernel
+def _cut_and_thin(
+    points: Points,
+    ranges: Vector,
+    beams: NDArray[np.int64],
+    rule: GapRule,
+    least: LeastSurface,
+    bin_m: float,
+    reach_m: float,
+    thinned: Points,
+    tangents: Points,
+    counts: Vector,
+    starts: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Write the clusters of a scan; the number of their points, and of themselves."""
+    m = len(points)
+    kept, bounds = np.empty((m, 2)), np.empty(m + 1, np.int64)
+    clusters = cut_surfaces(points, ranges, beams, rule, least, kept, bounds)
+    n = _thin(kept, np.ones(m), bounds[: clusters + 1], bin_m, thinned, counts, starts)
+    _tangents(thinned, starts[: clusters + 1], reach_m, tangents)
+    return n, clusters
+
+
 def find_clusters(
     returns: Returns,
     settings: SegmentationSettings,
@@ -168,17 +196,19 @@ def find_clusters(
         sigma_m=sigma_m if spaced else 0.0,
         fewest=settings.min_points,
     )
-    kept, bounds = np.empty((m, 2)), np.empty(m + 1, np.int64)
-    clusters = cut_surfaces(
+    points, tangents, counts = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
+    starts = np.empty(m + 1, np.int64)
+    n, clusters = _cut_and_thin(
         returns.points_body,
         returns.ranges_m,
         returns.beams if spaced else np.arange(m),
         rule,
         settings.least(knot_step_m),
-        kept,
-        bounds,
+        bin_m,
+        _reach_m(knot_step_m, sigma_m),
+        points,
+        tangents,
+        counts,
+        starts,
     )
-    points, counts = np.empty((m, 2)), np.empty(m)
-    starts = np.empty(clusters + 1, np.int64)
-    n = _thin(kept, np.ones(m), bounds[: clusters + 1], bin_m, points, counts, starts)
-    return Clusters.with_tangents(points[:n], counts[:n], starts, knot_step_m, sigma_m)
+    return Clusters(points[:n], tangents[:n], counts[:n], starts[: clusters + 1])
