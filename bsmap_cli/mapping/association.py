@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean
-from bsmap_cli.geometry.kernels import foot_point, polynomial_jet
+from bsmap_cli.geometry.kernels import foot_point, magnitude, polynomial_jet
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import nearest_span
@@ -96,7 +96,7 @@ def match_points(
                 )
                 x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
                 ex, ey = points[j, 0] - x, points[j, 1] - y
-                speed = math.hypot(dx, dy) + 1e-300
+                speed = magnitude(dx, dy) + 1e-300
                 beyond = abs(ex * dx + ey * dy) / speed > END_TOLERANCE * knot_step_m
                 along = (dx * tx + dy * ty) / speed
                 indexed = level.span_cell[row] >= 0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, kernel, lean
-from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
 from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain, spacing_weights
@@ -40,7 +40,7 @@ def sample_curve(
         span = min(max(math.floor(u[j]) - base, 0), level.count[curve] - degree - 1)
         span_polynomial(level.points, level.offset[curve] + span, matrix, polynomial)
         x, y, dx, dy, _, _ = polynomial_jet(polynomial, u[j] - base - span)
-        norm = math.hypot(dx, dy) + 1e-300
+        norm = magnitude(dx, dy) + 1e-300
         points[j, 0], points[j, 1] = x, y
         tangents[j, 0], tangents[j, 1] = dx / norm, dy / norm
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from bsmap_cli.geometry.compiled import inlined, lean
-from bsmap_cli.geometry.kernels import polynomial_jet
+from bsmap_cli.geometry.kernels import magnitude, polynomial_jet
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.drawn_grid import CHORDS, DrawnGrid, Integers, load, scratch
 
@@ -35,7 +35,7 @@ def _foot(
         span = max(min(math.floor(u), last), 0)
         load(grid, int(first) + span, polynomial, buffer)
         x, y, dx, dy, ddx, ddy = polynomial_jet(polynomial, u - span)
-        distance = math.hypot(px - x, py - y)
+        distance = magnitude(px - x, py - y)
         if step == NEWTON_STEPS:
             break
         slope = (x - px) * dx + (y - py) * dy
@@ -82,7 +82,7 @@ def _nearest(
                         for i in range(CHORDS + 1):
                             f = begin + (end - begin) * i / CHORDS
                             x, y, _, _, _, _ = polynomial_jet(polynomial, f)
-                            distance = math.hypot(px - x, py - y)
+                            distance = magnitude(px - x, py - y)
                             if distance < least:
                                 least, u = distance, f
                         if least > best + slack_m:

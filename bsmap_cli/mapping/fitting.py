@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from bsmap_cli.errors import FitError
 from bsmap_cli.geometry.basis import basis_matrix
 from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part, part
 from bsmap_cli.geometry.curve import Curve
-from bsmap_cli.geometry.kernels import basis_weights, solve_banded
+from bsmap_cli.geometry.kernels import basis_weights, magnitude, solve_banded
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.settings import setting
 
@@ -46,7 +47,7 @@ def chord_length_parameters(points: Points, start_u: float, knot_step_m: float, 
     """Eq. (7) in lattice units: u_1 = `start_u`, u_j = u_(j-1) + |p_j - p_(j-1)| / Delta."""
     u[0] = start_u
     for j in range(1, len(u)):
-        chord = math.hypot(points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1])
+        chord = magnitude(points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1])
         u[j] = u[j - 1] + chord / knot_step_m
 
 
@@ -76,28 +77,142 @@ def spacing_weights(u: Vector, longest: float, weights: Vector) -> None:
         weights[j] = 0.5 * (before + after)
 
 
+class FitRoom(NamedTuple):
+    """Where one fit after another is worked out: to allocate room for each costs more than the fit.
+
+    known : (n, 2) control points that the map has, where is_known : (n,) is 1 and not 0.
+    solution : (n, 2) control points of the fit; share : (n,) of a span's data under each.
+    band : (n, 4 or more), basis : (d + 1,) for the work.
+    """
+
+    known: Points
+    is_known: Vector
+    solution: Points
+    share: Vector
+    band: Points
+    basis: Vector
+
+
 @part
+def fit_room(rows: int, order: int) -> FitRoom:
+    """Room for fits of up to `rows` control points."""
+    return FitRoom(
+        np.empty((rows, 2)),
+        np.empty(rows),
+        np.empty((rows, 2)),
+        np.empty(rows),
+        np.empty((rows, max(order, 4))),
+        np.empty(order),
+    )
+
+
+@lean_part
 def fit_rms(
-    u: Vector, points: Points, weights: Vector, matrix: Points, first_span: int, fitted: Points
+    u: Vector,
+    points: Points,
+    weights: Vector,
+    matrix: Points,
+    first_span: int,
+    count: int,
+    room: FitRoom,
 ) -> float:
     """Weighted root mean square distance [m] of points from the fit, each at its parameter."""
     order = matrix.shape[0]
-    basis = np.empty(order)
     squares = total = 0.0
     for j in range(len(u)):
-        span = min(max(math.floor(u[j]) - first_span, 0), len(fitted) - order)
-        basis_weights(matrix, u[j] - first_span - span, basis)
+        span = min(max(math.floor(u[j]) - first_span, 0), count - order)
+        basis_weights(matrix, u[j] - first_span - span, room.basis)
         ex, ey = points[j, 0], points[j, 1]
         for a in range(order):
-            ex -= basis[a] * fitted[span + a, 0]
-            ey -= basis[a] * fitted[span + a, 1]
+            ex -= room.basis[a] * room.solution[span + a, 0]
+            ey -= room.basis[a] * room.solution[span + a, 1]
         squares += weights[j] * (ex * ex + ey * ey)
         total += weights[j]
     return math.sqrt(squares / max(total, 1e-300))
 
 
+@inlined
+def _add_point(order: int, span: int, weight: float, x: float, y: float, room: FitRoom) -> None:
+    """One point's part of the normal equations of eq. (8)."""
+    for a in range(order):
+        weighted = weight * room.basis[a]
+        room.share[span + a] += weighted
+        room.solution[span + a, 0] += weighted * x
+        room.solution[span + a, 1] += weighted * y
+        for b in range(a, order):
+            room.band[span + a, b - a] += weighted * room.basis[b]
+
+
+@inlined
+def _add_difference(
+    stencil: tuple[float, ...], size: int, i: int, pull: float, room: FitRoom
+) -> None:
+    """A penalty on the difference that begins at i, held to what it is where all is known."""
+    tx = ty = 0.0
+    all_known = 1.0
+    for a in range(size):
+        all_known *= room.is_known[i + a]
+    if all_known > 0.0:
+        for a in range(size):
+            tx += stencil[a] * room.known[i + a, 0]
+            ty += stencil[a] * room.known[i + a, 1]
+    for a in range(size):
+        pulled = pull * stencil[a]
+        room.solution[i + a, 0] += pulled * tx
+        room.solution[i + a, 1] += pulled * ty
+        for b in range(a, size):
+            room.band[i + a, b - a] += pulled * stencil[b]
+
+
+@lean_part
+def solve_fit(
+    u: Vector,
+    points: Points,
+    weights: Vector,
+    matrix: Points,
+    first_span: int,
+    penalty: float,
+    n: int,
+    room: FitRoom,
+) -> bool:
+    """`fit_control_points` on the first n rows of a room; leaves the shares there, too."""
+    order = matrix.shape[0]
+    for i in range(n):
+        room.solution[i, 0] = room.solution[i, 1] = room.share[i] = 0.0
+        for k in range(room.band.shape[1]):
+            room.band[i, k] = 0.0
+    mean_x = mean_y = 0.0
+    for j in range(len(u)):
+        mean_x += points[j, 0]
+        mean_y += points[j, 1]
+        span = min(max(math.floor(u[j]) - first_span, 0), n - order)
+        basis_weights(matrix, u[j] - first_span - span, room.basis)
+        if order == 4:  # as a number, for which loops are unrolled
+            _add_point(4, span, weights[j], points[j, 0], points[j, 1], room)
+        else:
+            _add_point(order, span, weights[j], points[j, 0], points[j, 1], room)
+    largest = 1e-12
+    for i in range(n):
+        largest = max(largest, room.band[i, 0])
+    mean_x, mean_y = mean_x / len(u), mean_y / len(u)
+    for i in range(n):
+        known = room.is_known[i] > 0.0
+        pull = (ANCHOR if known else RIDGE) * largest
+        room.band[i, 0] += pull
+        room.solution[i, 0] += pull * (room.known[i, 0] if known else mean_x)
+        room.solution[i, 1] += pull * (room.known[i, 1] if known else mean_y)
+    for i in range(n - 3):
+        _add_difference((-1.0, 3.0, -3.0, 1.0), 4, i, penalty, room)
+    for i in range(n - 2):
+        weakest = min(room.share[i], room.share[i + 1], room.share[i + 2])
+        pull = BEND_PENALTY * penalty * max(0.0, 1.0 - weakest)
+        if pull > 0.0:
+            _add_difference((1.0, -2.0, 1.0), 3, i, pull, room)
+    return solve_banded(room.band[:n], room.solution[:n])
+
+
 @kernel
-def fit_control_points(  # noqa: PLR0912
+def fit_control_points(
     u: Vector,
     points: Points,
     weights: Vector,
@@ -114,73 +229,29 @@ def fit_control_points(  # noqa: PLR0912
     all control points of a third difference are `known`, it is held to the difference they have,
     so that a correction is smoothed and not the shape of the map. False if the system is singular.
     """
-    n = len(solution)
-    order = matrix.shape[0]
-    band = np.zeros((n, max(order, 4)))
-    basis, share = np.empty(order), np.zeros(n)
-    for i in range(n):
-        solution[i, 0] = solution[i, 1] = 0.0
-    mean_x = mean_y = 0.0
-    for j in range(len(u)):
-        mean_x += points[j, 0]
-        mean_y += points[j, 1]
-        span = min(max(math.floor(u[j]) - first_span, 0), n - order)
-        basis_weights(matrix, u[j] - first_span - span, basis)
-        for a in range(order):
-            weighted = weights[j] * basis[a]
-            share[span + a] += weighted
-            solution[span + a, 0] += weighted * points[j, 0]
-            solution[span + a, 1] += weighted * points[j, 1]
-            for b in range(a, order):
-                band[span + a, b - a] += weighted * basis[b]
-    largest = 1e-12
-    for i in range(n):
-        largest = max(largest, band[i, 0])
-    mean_x, mean_y = mean_x / len(u), mean_y / len(u)
-    for i in range(n):
-        pull = (ANCHOR if is_known[i] > 0.0 else RIDGE) * largest
-        band[i, 0] += pull
-        solution[i, 0] += pull * (known[i, 0] if is_known[i] > 0.0 else mean_x)
-        solution[i, 1] += pull * (known[i, 1] if is_known[i] > 0.0 else mean_y)
-    stencil = (-1.0, 3.0, -3.0, 1.0)
-    for i in range(n - 3):
-        tx = ty = 0.0
-        if is_known[i] * is_known[i + 1] * is_known[i + 2] * is_known[i + 3] > 0.0:
-            for a in range(4):
-                tx += stencil[a] * known[i + a, 0]
-                ty += stencil[a] * known[i + a, 1]
-        for a in range(4):
-            solution[i + a, 0] += penalty * stencil[a] * tx
-            solution[i + a, 1] += penalty * stencil[a] * ty
-            for b in range(a, 4):
-                band[i + a, b - a] += penalty * stencil[a] * stencil[b]
-    bend = (1.0, -2.0, 1.0)
-    for i in range(n - 2):
-        weakest = min(share[i], share[i + 1], share[i + 2])
-        pull = BEND_PENALTY * penalty * max(0.0, 1.0 - weakest)
-        tx = ty = 0.0
-        if is_known[i] * is_known[i + 1] * is_known[i + 2] > 0.0:
-            for a in range(3):
-                tx += bend[a] * known[i + a, 0]
-                ty += bend[a] * known[i + a, 1]
-        for a in range(3):
-            solution[i + a, 0] += pull * bend[a] * tx
-            solution[i + a, 1] += pull * bend[a] * ty
-            for b in range(a, 3):
-                band[i + a, b - a] += pull * bend[a] * bend[b]
-    return solve_banded(band, solution)
+    n, order = len(solution), matrix.shape[0]
+    room = FitRoom(
+        known, is_known, solution, np.empty(n), np.empty((n, max(order, 4))), np.empty(order)
+    )
+    return solve_fit(u, points, weights, matrix, first_span, penalty, n, room)
 
 
-@part
+@lean_part
 def arc_length_parameters(
-    u: Vector, control_points: Points, matrix: Points, first_span: int, anchor: int, step_m: float
+    u: Vector,
+    control_points: Points,
+    matrix: Points,
+    first_span: int,
+    anchor: int,
+    step_m: float,
+    basis: Vector,
 ) -> None:
     """Replace u by arc length / Delta along the fitted curve; u[anchor] stays as it is.
 
     Raw chord length grows with the noise; a smooth fit through the noise does not.
+    basis : (d + 1,) room for the work.
     """
     order = matrix.shape[0]
-    basis = np.empty(order)
     spans = len(control_points) - order + 1
     kept = u[anchor]
     samples = 8
@@ -200,7 +271,7 @@ def arc_length_parameters(
                 x += basis[a] * control_points[span + a, 0]
                 y += basis[a] * control_points[span + a, 1]
             if j > 0 or piece > 1:
-                chord = math.hypot(x - x_before, y - y_before)
+                chord = magnitude(x - x_before, y - y_before)
                 arc += math.copysign(chord, target - start) / step_m
             x_before, y_before = x, y
         last = target
@@ -264,7 +335,9 @@ def fit_curve(
         if not solved:
             raise FitError("the points leave a control point undefined: raise fitting.penalty")
         if attempt + 1 < len(penalties):
-            arc_length_parameters(u, control_points, matrix, low, 0, knot_step_m)
+            arc_length_parameters(
+                u, control_points, matrix, low, 0, knot_step_m, np.empty(degree + 1)
+            )
     return Curve(
         degree=degree,
         knot_step_m=knot_step_m,

@@ -13,15 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part, part
+from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import refresh_spans
 from bsmap_cli.mapping.fitting import (
-    fit_control_points,
+    FitRoom,
     fit_rms,
     lattice_domain,
     least_and_greatest,
+    solve_fit,
 )
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import remove_span
@@ -194,7 +195,7 @@ def merge_fitted(
     return curve
 
 
-@part
+@lean_part
 def merge_run(
     level: LevelArrays,
     matrix: Points,
@@ -207,6 +208,7 @@ def merge_run(
     penalty: float,
     roughest_m: float,
     by_table: bool,
+    room: FitRoom,
 ) -> bool:
     """Fit points with known parameters on the lattice of a curve and average the fit into it.
 
@@ -218,29 +220,28 @@ def merge_run(
     start_u, end_u = least_and_greatest(u)
     low, high = lattice_domain(start_u, end_u)
     first, count = low - degree, high - low + degree
-    known, is_known = np.zeros((count, 2)), np.zeros(count)
+    for i in range(count):
+        room.is_known[i] = 0.0
     if curve >= 0 and not by_table:
         shift = level.offset[curve] + first - level.first[curve]
         for i in range(count):
             row = shift + i
             inside = level.offset[curve] <= row < level.offset[curve] + level.count[curve]
             if inside and level.weights[row] >= KNOWN_WEIGHT:
-                known[i, 0], known[i, 1] = level.points[row, 0], level.points[row, 1]
-                is_known[i] = 1.0
-    fitted, omega = np.empty((count, 2)), np.empty(count)
-    if not fit_control_points(u, points, weights, matrix, low, penalty, known, is_known, fitted):
+                room.known[i, 0], room.known[i, 1] = level.points[row, 0], level.points[row, 1]
+                room.is_known[i] = 1.0
+    if not solve_fit(u, points, weights, matrix, low, penalty, count, room):
         return False
-    if fit_rms(u, points, weights, matrix, low, fitted) > roughest_m:
+    if fit_rms(u, points, weights, matrix, low, count, room) > roughest_m:
         return False
-    observed_share(u, weights, matrix, low, omega)
     merge_fitted(
         level,
         matrix,
         knot_step_m,
         curve,
         first,
-        fitted,
-        omega,
+        room.solution[:count],
+        room.share[:count],
         start_u,
         end_u,
         max_weight,

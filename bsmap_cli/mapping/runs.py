@@ -7,13 +7,13 @@ is long enough becomes a curve of its own.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean, lean_part
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.least_surface import LeastSurface, is_surface
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -28,14 +28,14 @@ CURVE, BEGIN, END, KNOWN_BEGIN, KNOWN_END = range(5)
 def _stretch_length(points: Points, begin: int, end: int) -> float:
     length = 0.0
     for j in range(begin + 1, end):
-        length += math.hypot(points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1])
+        length += magnitude(points[j, 0] - points[j - 1, 0], points[j, 1] - points[j - 1, 1])
     return length
 
 
 @inlined
 def _same_run(u: Vector, points: Points, last: int, j: int, knot_step_m: float) -> bool:
     """Does matched point j go on where `last` was: forward by about the way between them?"""
-    way = math.hypot(points[j, 0] - points[last, 0], points[j, 1] - points[last, 1]) / knot_step_m
+    way = magnitude(points[j, 0] - points[last, 0], points[j, 1] - points[last, 1]) / knot_step_m
     advance = u[j] - u[last]
     return bool(-0.5 <= advance <= 1.5 * way + 0.5)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
 
@@ -62,7 +62,7 @@ def _sample(
         span_polynomial(control_points, row, matrix, polynomial)
         for k in range(per_span):
             x, y, dx, dy, _, _ = polynomial_jet(polynomial, (k + 0.5) / per_span)
-            norm = math.hypot(dx, dy) + 1e-300
+            norm = magnitude(dx, dy) + 1e-300
             points[n, 0], points[n, 1] = x, y
             directions[n, 0], directions[n, 1] = dx / norm, dy / norm
             n += 1
