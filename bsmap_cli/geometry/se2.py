@@ -44,7 +44,7 @@ class SE2(NamedTuple):
 
     def as_array(self) -> Vector:
         """(3,) float64: x, y, theta."""
-        return np.array(self)
+        return np.array(tuple(self))  # as a plain tuple numpy reads it faster
 
     def inverse(self) -> SE2:
         """The motion back."""
@@ -55,9 +55,11 @@ class SE2(NamedTuple):
 
     def relative_to(self, origin: SE2) -> SE2:
         """`origin.inverse() @ self`: this pose in the frame of another one."""
-        cos, sin = math.cos(origin.theta), math.sin(origin.theta)
-        dx, dy = self.x - origin.x, self.y - origin.y
-        return SE2(cos * dx + sin * dy, cos * dy - sin * dx, wrap_angle(self.theta - origin.theta))
+        x, y, theta = self
+        origin_x, origin_y, turned = origin
+        cos, sin = math.cos(turned), math.sin(turned)
+        dx, dy = x - origin_x, y - origin_y
+        return SE2(cos * dx + sin * dy, cos * dy - sin * dx, wrap_angle(theta - turned))
 
     def transform(self, points: Points) -> Points:
         """Eq. (2): (m, 2) points of the inner frame, expressed in the outer one [m]."""
@@ -66,9 +68,7 @@ class SE2(NamedTuple):
         return np.stack((cos * x - sin * y + self.x, sin * x + cos * y + self.y), axis=-1)
 
     def __matmul__(self, other: SE2) -> SE2:
-        cos, sin = math.cos(self.theta), math.sin(self.theta)
-        return SE2(
-            self.x + cos * other.x - sin * other.y,
-            self.y + sin * other.x + cos * other.y,
-            wrap_angle(self.theta + other.theta),
-        )
+        x, y, theta = self
+        dx, dy, turn = other
+        cos, sin = math.cos(theta), math.sin(theta)
+        return SE2(x + cos * dx - sin * dy, y + sin * dx + cos * dy, wrap_angle(theta + turn))

@@ -80,10 +80,11 @@ class LocalSlam:
             )
         prediction = self._predictor.predict(pose_odom_base, self._cadence.elapsed_s)
         blind = stretch if pose_odom_base is None else 1.0
+        older = self.older
         result = match_scan(
-            self.older,
+            older,
             clusters,
-            self.older.to_submap(self._pose),
+            older.to_submap(self._pose),
             prediction,
             blind=blind,
             explained=self._explained,
@@ -92,9 +93,10 @@ class LocalSlam:
         )
         told = result.points >= FEWEST_POINTS
         lost = told and result.inlier_ratio < self.settings.recovery.lost_below
-        pose = self._pose @ prediction.step
-        if not lost and told:
-            pose = self.older.pose_local @ SE2.from_array(result.pose)
+        if told and not lost:
+            pose = older.pose_local @ SE2.from_array(result.pose)
+        else:
+            pose = self._pose @ prediction.step
         self._lost_scans = self._lost_scans + 1 if lost else 0
         if result.degenerate or lost or not told:
             self._coasted_m += prediction.drift_m
@@ -102,8 +104,9 @@ class LocalSlam:
             self._coasted_rad += prediction.drift_rad
         measured = told and not lost and not result.degenerate
         step = pose.relative_to(self._pose)
-        sigma_m = result.worst_sigma_m if measured else 0.0
-        self._predictor.observe(step, pose_odom_base, measured=measured, sigma_m=sigma_m)
+        self._predictor.observe(
+            step, pose_odom_base, measured=measured, information=result.information
+        )
         self._pose, self._explained = pose, result.inlier_ratio
         self._afresh = self._afresh and (lost or not told)
         moved = pose.relative_to(self.keyframes[-1].pose_local)

@@ -119,8 +119,9 @@ class Localizer:
             self._usual_ratio += MEMORY * (result.inlier_ratio - self._usual_ratio)
         measured = told and not lost and not result.degenerate
         step = self._pose.inverse() @ pose
-        sigma_m = result.worst_sigma_m if measured else 0.0
-        self._predictor.observe(step, scan.pose_odom_base, measured=measured, sigma_m=sigma_m)
+        self._predictor.observe(
+            step, scan.pose_odom_base, measured=measured, information=result.information
+        )
         self._pose = pose
         self._poses.extend(pose.as_array())
         self._lost_in_a_row = self._lost_in_a_row + 1 if lost else 0

@@ -83,7 +83,7 @@ class Predictor:
         self._odometry: SE2 | None = None
         self.last_step = SE2.identity()
         self._cruise_m = (0.0, 0.0)
-        self._vague_m = 0.0
+        self._told: Points | None = None
         self._steps = -1  # the first pose is no step
         self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
         self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
@@ -105,19 +105,26 @@ class Predictor:
         square_s2 = min(elapsed_s, LONGEST_S) ** 2
         started_rad = math.radians(settings.acceleration_deg_s2) * square_s2
         started_m = settings.acceleration_m_s2 * square_s2
-        sigma_m = max(settings.motion_margin * self._spread_m, math.hypot(started_m, self._vague_m))
+        vague_m = 0.0 if self._told is None else FOLLOWING * worst_sigma_m(self._told)
+        sigma_m = max(settings.motion_margin * self._spread_m, math.hypot(started_m, vague_m))
         sigma_rad = max(settings.motion_margin * self._spread_rad, started_rad)
         return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, sigma_rad, False)
 
     def observe(
-        self, step: SE2, pose_odom_base: SE2 | None, *, measured: bool, sigma_m: float = 0.0
+        self,
+        step: SE2,
+        pose_odom_base: SE2 | None,
+        *,
+        measured: bool,
+        information: Points | None = None,
     ) -> None:
         """Tell what the step turned out to be, and whether the walls said so in all directions.
 
-        sigma_m : how well the walls told its worst direction. A velocity taken from such poses is
-        hardly better, and a robot that brakes must not be carried past the little that holds it.
+        information : (3, 3) of the match that says so. A velocity taken from such poses is hardly
+        better than they in the direction that the walls tell least of, and a robot that brakes
+        must not be carried past the little that holds it.
         """
-        self._vague_m = FOLLOWING * sigma_m if measured else 0.0
+        self._told = information if measured else None
         if measured:
             surprise = step.relative_to(self.last_step)
             settings = self.settings
@@ -134,6 +141,13 @@ class Predictor:
         if not measured:  # what no wall says must not grow out of the noise of one step
             self.last_step = SE2(*self._cruise_m, step.theta)
         self._odometry = pose_odom_base
+
+
+def worst_sigma_m(information: Points) -> float:
+    """Deviation [m] of a position in the direction that (3, 3) information tells least of."""
+    (xx, xy, _), (_, yy, _), _ = information.tolist()
+    least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+    return 1.0 / math.sqrt(max(least, 1e-12))
 
 
 def _faded(spread: float, squared: float) -> float:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.kernels import solve3
+from bsmap_cli.geometry.kernels import magnitude, solve3
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -24,7 +24,7 @@ from bsmap_cli.slam.degeneracy import keep_unobserved
 from bsmap_cli.slam.point_equations import accumulate
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
-STILL = 5e-3  # a smaller step ends the iteration [knot steps]; the next would be its square
+STILL = 5e-3  # a smaller step ends the iteration [knot steps]; a quarter of it is left
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
@@ -90,17 +90,10 @@ class RegistrationResult(NamedTuple):
     degenerate: int
     points: int
 
-    @property
-    def worst_sigma_m(self) -> float:
-        """Deviation of the position in the direction that the data tell least of."""
-        (xx, xy, _), (_, yy, _), _ = self.information.tolist()
-        least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
-        return 1.0 / math.sqrt(max(least, 1e-12))
-
 
 @kernel
 def _register(
-    level: LevelArrays,
+    arrays: tuple[Any, ...],
     matrix: Points,
     knot_step_m: float,
     points: Points,
@@ -119,7 +112,11 @@ def _register(
     hessian: Points,
     tally: Vector,
 ) -> tuple[int, int]:
-    """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
+    """Gauss-Newton on `pose` in place; steps taken and degenerate directions.
+
+    arrays : of the level; what is no more than a tuple is handed over three times as fast.
+    """
+    level = LevelArrays(*arrays)
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
     for j in range(len(points)):
         variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
@@ -159,14 +156,14 @@ def _register(
                 system[i, k] = hessian[i, k] + prior_information[i, k]
                 right[i] += prior_information[i, k] * wanted[k]
         solve3(system, right, delta)
+        lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
         for i in range(3):
             wanted[i] = start[i] - pose[i]
-        lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
         least = degenerate * tally[4]
         found = keep_unobserved(hessian, jacobian, lever, least, certain * least, wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
-        moved = math.hypot(delta[0], delta[1]) + lever * abs(delta[2])
+        moved = magnitude(delta[0], delta[1]) + lever * abs(delta[2])
         if moved < STILL * knot_step_m:
             break
     return steps, found
@@ -194,7 +191,7 @@ def register(
     step = curve_map.knot_step_m
     pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(5)
     steps, degenerate = _register(
-        curve_map.arrays,
+        tuple(curve_map.arrays),
         curve_map.matrix,
         step,
         clusters.points,
