@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.control_points import fit_control_points
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
-from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain, spacing_weights
+from bsmap_cli.mapping.fitting import lattice_domain, spacing_weights
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.merging import extend_rows
 from bsmap_cli.mapping.span_index import EMPTY, cell_key, find_slot, remove_span

@@ -15,8 +15,9 @@ import numpy as np
 from bsmap_cli.geometry.compiled import kernel
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.association import match_points
+from bsmap_cli.mapping.control_points import fit_control_points
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
-from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain, spacing_weights
+from bsmap_cli.mapping.fitting import lattice_domain, spacing_weights
 from bsmap_cli.mapping.least_surface import LeastSurface
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.map_document import MapLevel

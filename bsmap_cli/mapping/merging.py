@@ -16,14 +16,9 @@ import numpy as np
 from bsmap_cli.geometry.compiled import inlined, kernel, lean, lean_part
 from bsmap_cli.geometry.kernels import basis_weights
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.control_points import FitRoom, fit_rms, solve_fit
 from bsmap_cli.mapping.curve_map import refresh_spans
-from bsmap_cli.mapping.fitting import (
-    FitRoom,
-    fit_rms,
-    lattice_domain,
-    least_and_greatest,
-    solve_fit,
-)
+from bsmap_cli.mapping.fitting import lattice_domain, least_and_greatest
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import remove_span
 from bsmap_cli.mapping.table_merge import merge_by_table

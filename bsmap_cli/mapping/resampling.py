@@ -8,7 +8,8 @@ import numpy as np
 
 from bsmap_cli.geometry.basis import basis_matrix
 from bsmap_cli.geometry.se2 import Points, Vector
-from bsmap_cli.mapping.fitting import fit_control_points, lattice_domain
+from bsmap_cli.mapping.control_points import fit_control_points
+from bsmap_cli.mapping.fitting import lattice_domain
 from bsmap_cli.mapping.freeze import join_levels
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.merging import observed_share

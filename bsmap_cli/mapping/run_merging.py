@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from bsmap_cli.geometry.compiled import inlined, kernel, lean_part, part
 from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.mapping.control_points import FitRoom, fit_room, solve_fit
 from bsmap_cli.mapping.fitting import (
-    FitRoom,
     arc_length_parameters,
-    fit_room,
     lattice_domain,
     least_and_greatest,
-    solve_fit,
     spacing_weights,
 )
 from bsmap_cli.mapping.level_arrays import LevelArrays

@@ -11,11 +11,11 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from bsmap_cli.errors import FitError
 from bsmap_cli.geometry.basis import basis_matrix
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.mapping.control_points import fit_control_points
 from bsmap_cli.mapping.fitting import (
     SNAP,
     FittingSettings,
     chord_length_parameters,
-    fit_control_points,
     fit_curve,
     lattice_domain,
     spacing_weights,
