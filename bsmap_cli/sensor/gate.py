@@ -19,6 +19,7 @@ NO_RETURN_SHARE = 0.995  # of range_max: "a hair less" is a code for no return, 
 # three deviations of 1 %, as short-range lidars have: nearer the limit readings err to one side,
 # as no surface beyond it answers that would err to the other, and walls bend where they leave sight
 FAIR_SHARE = 0.97
+STANDING = np.zeros(3)  # as a twist
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +159,7 @@ def find_returns(
         near,
         far,
         scan.pose_base_laser.as_array(),
-        twist_body if twist_body is not None else np.zeros(3),
+        twist_body if twist_body is not None else STANDING,
         scan.time_increment_s if deskew else 0.0,
         points,
         lengths,
