@@ -27,6 +27,11 @@ def wait_until_it_listens(process):
 
 def interrupted(folder, number, after_s, *arguments, stdin=subprocess.DEVNULL, **changes):
     """Send a signal to a running command; its exit code and what it said."""
+
+    def heed_it():  # the tests may have been started so that it is ignored, as nohup does
+        if number != signal.SIGKILL:
+            signal.signal(number, signal.SIG_DFL)
+
     process = subprocess.Popen(
         [BSMAP, *map(str, arguments)],
         cwd=folder,
@@ -34,6 +39,7 @@ def interrupted(folder, number, after_s, *arguments, stdin=subprocess.DEVNULL, *
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=environment(**changes),
+        preexec_fn=heed_it,
     )
     wait_until_it_listens(process)
     time.sleep(after_s)
