@@ -39,7 +39,7 @@ def interrupted(folder, number, after_s, *arguments, stdin=subprocess.DEVNULL, *
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=environment(**changes),
-        preexec_fn=heed_it,
+        preexec_fn=heed_it,  # noqa: PLW1509 (no threads here)
     )
     wait_until_it_listens(process)
     time.sleep(after_s)
