@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.least_surface import LeastSurface, is_surface
 
@@ -43,8 +44,7 @@ class GapRule(NamedTuple):
 
 @inlined
 def _apart_m(points: Points, i: int, j: int) -> float:
-    x, y = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-    return math.sqrt(x * x + y * y)
+    return magnitude(points[j, 0] - points[i, 0], points[j, 1] - points[i, 1])
 
 
 @inlined

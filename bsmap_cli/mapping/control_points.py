@@ -83,10 +83,9 @@ def _add_point(order: int, span: int, weight: float, x: float, y: float, room: F
 
 
 @inlined
-def _add_difference(
-    stencil: tuple[float, ...], size: int, i: int, pull: float, room: FitRoom
-) -> None:
+def _add_difference(stencil: tuple[float, ...], i: int, pull: float, room: FitRoom) -> None:
     """A penalty on the difference that begins at i, held to what it is where all is known."""
+    size = len(stencil)
     tx = ty = 0.0
     all_known = 1.0
     for a in range(size):
@@ -141,12 +140,12 @@ def solve_fit(
         room.solution[i, 0] += pull * (room.known[i, 0] if known else mean_x)
         room.solution[i, 1] += pull * (room.known[i, 1] if known else mean_y)
     for i in range(n - 3):
-        _add_difference((-1.0, 3.0, -3.0, 1.0), 4, i, penalty, room)
+        _add_difference((-1.0, 3.0, -3.0, 1.0), i, penalty, room)
     for i in range(n - 2):
         weakest = min(room.share[i], room.share[i + 1], room.share[i + 2])
         pull = BEND_PENALTY * penalty * max(0.0, 1.0 - weakest)
         if pull > 0.0:
-            _add_difference((1.0, -2.0, 1.0), 3, i, pull, room)
+            _add_difference((1.0, -2.0, 1.0), i, pull, room)
     return solve_banded(room.band[:n], room.solution[:n])
 
 

@@ -46,8 +46,8 @@ def _raw_parameters(
     tangents: Points,
     knot_step_m: float,
     run_u: Vector,
-) -> int:
-    """Foot points where the run is matched, the way along it elsewhere; how many rows it spans."""
+) -> tuple[int, int]:
+    """Foot points where the run is matched, the way along it elsewhere; the lattice they need."""
     begin, end = run[BEGIN], run[END]
     known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
     run_u[known_begin - begin] = u[known_begin] if known_end > known_begin else 0.0
@@ -59,8 +59,7 @@ def _raw_parameters(
     for j in range(known_begin - 1, begin - 1, -1):
         run_u[j - begin] = run_u[j + 1 - begin] - _advance(points, tangents, j + 1) / knot_step_m
     first_u, last_u = least_and_greatest(run_u)
-    low, high = lattice_domain(first_u, last_u)
-    return high - low
+    return lattice_domain(first_u, last_u)
 
 
 @lean_part
@@ -70,18 +69,17 @@ def _smooth_parameters(
     matrix: Points,
     knot_step_m: float,
     first_penalty: float,
+    low: int,
+    count: int,
     run_u: Vector,
     arc_u: Vector,
     weights: Vector,
     room: FitRoom,
 ) -> None:
-    """Arc length along a smooth fit for the points that are not matched."""
+    """Arc length along a smooth fit of `count` rows for the points that are not matched."""
     begin, end = run[BEGIN], run[END]
     known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
     n, anchor = end - begin, known_begin - begin
-    first_u, last_u = least_and_greatest(run_u)
-    low, high = lattice_domain(first_u, last_u)
-    count = high - low + matrix.shape[0] - 1
     spacing_weights(run_u, 1.0, weights)
     for i in range(count):
         room.is_known[i] = 0.0
@@ -116,13 +114,24 @@ def run_parameters(
     run_u: Vector,
 ) -> None:
     """Parameters of a run: foot points where it is matched, arc length where it is not."""
-    spans = _raw_parameters(run, curves, u, points, tangents, knot_step_m, run_u)
+    low, high = _raw_parameters(run, curves, u, points, tangents, knot_step_m, run_u)
     if _is_smooth(run):
         return
     order, n = matrix.shape[0], len(run_u)
-    room = fit_room(spans + order, order)
-    arc_u, weights = np.empty(n), np.empty(n)
-    _smooth_parameters(run, points, matrix, knot_step_m, first_penalty, run_u, arc_u, weights, room)
+    count = high - low + order - 1
+    _smooth_parameters(
+        run,
+        points,
+        matrix,
+        knot_step_m,
+        first_penalty,
+        low,
+        count,
+        run_u,
+        np.empty(n),
+        np.empty(n),
+        fit_room(count, order),
+    )
 
 
 @part
@@ -147,19 +156,30 @@ def merge_runs(
     all_u, all_arc, all_weights = np.empty(n), np.empty(n), np.empty(n)
     room = fit_room(n + 2 * order, order)
     for r in range(resume, len(runs)):
-        run, begin, end = runs[r], runs[r, BEGIN], runs[r, END]
-        curve = runs[r, CURVE]
+        run, curve, begin, end = runs[r], runs[r, CURVE], runs[r, BEGIN], runs[r, END]
+        known_begin, known_end = run[KNOWN_BEGIN], run[KNOWN_END]
         run_u, arc_u, weights = (
             all_u[: end - begin],
             all_arc[: end - begin],
             all_weights[: end - begin],
         )
-        spans = _raw_parameters(run, curves, u, points, tangents, knot_step_m, run_u)
+        low, high = _raw_parameters(run, curves, u, points, tangents, knot_step_m, run_u)
         if not _is_smooth(run):
-            if spans + order > len(room.share):
-                room = fit_room(2 * (spans + order), order)
+            fitted = high - low + order - 1
+            if fitted > len(room.share):
+                room = fit_room(2 * fitted, order)
             _smooth_parameters(
-                run, points, matrix, knot_step_m, first_penalty, run_u, arc_u, weights, room
+                run,
+                points,
+                matrix,
+                knot_step_m,
+                first_penalty,
+                low,
+                fitted,
+                run_u,
+                arc_u,
+                weights,
+                room,
             )
         least, greatest = least_and_greatest(run_u)
         rows = math.ceil(greatest - least) + 2 * order
@@ -171,19 +191,18 @@ def merge_runs(
             level.sizes[3] = 2 * rows + 16
             return r
         spacing_weights(run_u, 1.0, weights)
-        for j in range(runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]):
+        for j in range(known_begin, known_end):
             if curves[j] != curve:
                 weights[j - begin] = 0.0
-        known_begin, known_end = runs[r, KNOWN_BEGIN], runs[r, KNOWN_END]
         while True:  # all of the run; where that fits badly, what of it is matched
             merged = merge_run(
                 level,
                 matrix,
                 knot_step_m,
                 curve,
-                run_u[begin - runs[r, BEGIN] : end - runs[r, BEGIN]],
+                run_u[begin - run[BEGIN] : end - run[BEGIN]],
                 points[begin:end],
-                weights[begin - runs[r, BEGIN] : end - runs[r, BEGIN]],
+                weights[begin - run[BEGIN] : end - run[BEGIN]],
                 max_weight,
                 penalty,
                 roughest_m,
