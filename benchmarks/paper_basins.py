@@ -14,7 +14,6 @@ from bsmap_cli.geometry.se2 import SE2, Vector, wrap_angle
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.scan_levels import scan_levels
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.sensor.gate import find_returns
 from bsmap_cli.sensor.simulator.simulation import simulate
 from bsmap_cli.slam.ladder import track_down
 
@@ -83,9 +82,7 @@ def _mapped(scene: str, lidar: str) -> tuple[Mapper, list[tuple[Sequence[Cluster
         if k % every == 0:
             mapper.insert(scan, SE2.from_array(pose))
         elif k % other == 1:
-            returns = find_returns(scan, settings.sensor, settings.ladder[-1])
-            levels = (settings.ladder, settings.segmentation, settings.fitting, NOISE_M)
-            asked.append((scan_levels(returns, *levels), pose))
+            asked.append((scan_levels(scan, settings, NOISE_M), pose))
     return mapper, asked
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bsmap_cli.geometry.se2 import SE2, Vector
+from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.cleanup import tidy
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.evidence import View, remove_unseen
@@ -15,7 +15,6 @@ from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapping_settings import MappingSettings
 from bsmap_cli.mapping.scan_levels import scan_levels
 from bsmap_cli.mapping.trimming import remove_guessed
-from bsmap_cli.sensor.gate import Returns, find_returns
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.sight import find_sight
@@ -35,20 +34,12 @@ class Mapper:
 
     def insert(self, scan: Scan, pose_map_base: SE2) -> None:
         """Algorithm 1: one scan enters the map at its pose."""
-        finest = self.settings.ladder[-1]
+        settings, pose = self.settings, pose_map_base.as_array()
         self.noise.observe(scan)
-        returns = find_returns(scan, self.settings.sensor, finest)
-        self.insert_returns(returns, pose_map_base.as_array())
-        self._look(scan, pose_map_base)
-
-    def insert_returns(self, returns: Returns, pose_map_base: Vector) -> None:
-        """Insert what `find_returns` gave, into every level."""
-        settings = self.settings
-        clusters = scan_levels(
-            returns, settings.ladder, settings.segmentation, settings.fitting, self.noise.sigma_m
-        )
+        clusters = scan_levels(scan, settings, self.noise.sigma_m)
         for level, seen in zip(self.levels, clusters, strict=True):
-            insert_clusters(level, seen, pose_map_base, settings)
+            insert_clusters(level, seen, pose, settings)
+        self._look(scan, pose_map_base)
 
     def _look(self, scan: Scan, pose_map_base: SE2) -> None:
         """Lower at once the weights of what the scan looks through, or keep it for the end."""

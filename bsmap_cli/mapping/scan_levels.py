@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.fitting import FittingSettings
 from bsmap_cli.mapping.levels import Levels
-from bsmap_cli.mapping.segmentation import Clusters, SegmentationSettings, find_clusters
-from bsmap_cli.sensor.gate import Returns
+from bsmap_cli.mapping.segmentation import Clusters, find_clusters
+from bsmap_cli.sensor.gate import STANDING, fan_of
+from bsmap_cli.sensor.scan import Scan
+
+if TYPE_CHECKING:
+    from bsmap_cli.mapping.mapping_settings import MappingSettings
 
 
 class ScanLevels(Levels[Clusters]):
@@ -35,27 +41,29 @@ class ScanLevels(Levels[Clusters]):
 
 
 def scan_levels(
-    returns: Returns,
-    ladder: tuple[float, ...],
-    segmentation: SegmentationSettings,
-    fitting: FittingSettings,
+    scan: Scan,
+    settings: MappingSettings,
     sigma_m: float,
+    twist_body: Vector = STANDING,
 ) -> Sequence[Clusters]:
     """Segment at the finest knot step, eq. (3), and widen the bins for the coarser ones.
 
     With `segmentation.each_level` every knot step is segmented on its own, as in the paper.
+    twist_body : as in `find_clusters`.
     """
-    steps = ladder if segmentation.each_level else ladder[-1:]
+    ladder, thinning = settings.ladder, settings.fitting.thinning
+    fan = fan_of(scan, settings.sensor, ladder[-1])
+    each = settings.segmentation.each_level
     found = [
         find_clusters(
-            returns,
-            segmentation,
+            scan,
+            fan,
+            settings.segmentation,
             knot_step_m=step,
-            bin_m=fitting.thinning * step,
+            bin_m=thinning * step,
             sigma_m=sigma_m,
+            twist_body=twist_body,
         )
-        for step in steps
+        for step in (ladder if each else ladder[-1:])
     ]
-    if segmentation.each_level:
-        return found
-    return ScanLevels(found[0], ladder, fitting, sigma_m)
+    return found if each else ScanLevels(found[0], ladder, settings.fitting, sigma_m)

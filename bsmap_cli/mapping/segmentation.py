@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from bsmap_cli.geometry.compiled import kernel, lean
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.continuity import BEAM_GAPS, GapRule, cut_surfaces
 from bsmap_cli.mapping.least_surface import LeastSurface
-from bsmap_cli.sensor.gate import Returns
+from bsmap_cli.sensor.gate import STANDING, Fan, gather
+from bsmap_cli.sensor.scan import Ranges, Scan
 from bsmap_cli.settings import setting
 
 
@@ -157,10 +159,10 @@ def _tangents(points: Points, starts: NDArray[np.int64], reach_m: float, tangent
 
 
 @kernel
-def _cut_and_thin(
-    points: Points,
-    ranges: Vector,
-    beams: NDArray[np.int64],
+def _see(
+    ranges: Ranges,
+    beam_fan: tuple[Any, ...],
+    twist_body: Vector,
     gap_rule: tuple[Any, ...],
     least_surface: tuple[Any, ...],
     bin_m: float,
@@ -172,43 +174,61 @@ def _cut_and_thin(
 ) -> tuple[int, int]:
     """Write the clusters of a scan; the number of their points, and of themselves.
 
-    Rule and least surface come as plain tuples, which are handed over three times as fast.
+    Fan, rule and least surface come as plain tuples, which are handed over three times as fast.
     """
     rule, least = GapRule(*gap_rule), LeastSurface(*least_surface)
-    m = len(points)
+    beams = len(ranges)
+    points, lengths, returned = np.empty((beams, 2)), np.empty(beams), np.empty(beams, np.int64)
+    m = gather(ranges, Fan(*beam_fan), twist_body, points, lengths, returned)
+    if rule.beam_gap_rad == 0.0:  # eq. (3) knows no beams that tell nothing
+        for i in range(m):
+            returned[i] = i
     kept, bounds = np.empty((m, 2)), np.empty(m + 1, np.int64)
-    clusters = cut_surfaces(points, ranges, beams, rule, least, kept, bounds)
+    clusters = cut_surfaces(points[:m], lengths[:m], returned[:m], rule, least, kept, bounds)
     n = _thin(kept, np.ones(m), bounds[: clusters + 1], bin_m, thinned, counts, starts)
     _tangents(thinned, starts[: clusters + 1], reach_m, tangents)
     return n, clusters
 
 
+@lru_cache(maxsize=64)
+def _rules(
+    settings: SegmentationSettings, knot_step_m: float, sigma_m: float, beam_step_rad: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Gap rule and least surface: the same from scan to scan until the noise is known better."""
+    rule = GapRule(
+        max_gap_m=settings.max_gap * knot_step_m,
+        rel_gap=settings.rel_gap,
+        beam_gap_rad=BEAM_GAPS * beam_step_rad if settings.beam_gap else 0.0,
+        sigma_m=sigma_m if settings.beam_gap else 0.0,
+        fewest=settings.min_points,
+    )
+    return tuple(rule), tuple(settings.least(knot_step_m))
+
+
 def find_clusters(
-    returns: Returns,
+    scan: Scan,
+    fan: Fan,
     settings: SegmentationSettings,
     *,
     knot_step_m: float,
     bin_m: float,
     sigma_m: float,
+    twist_body: Vector = STANDING,
 ) -> Clusters:
-    """Cut the returns where the surface ends, eq. (3), and thin each cluster into bins."""
-    m = len(returns)
-    spaced = settings.beam_gap
-    rule = GapRule(
-        max_gap_m=settings.max_gap * knot_step_m,
-        rel_gap=settings.rel_gap,
-        beam_gap_rad=BEAM_GAPS * returns.beam_step_rad if spaced else 0.0,
-        sigma_m=sigma_m if spaced else 0.0,
-        fewest=settings.min_points,
-    )
-    points, tangents, counts = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
-    starts = np.empty(m + 1, np.int64)
-    n, clusters = _cut_and_thin(
-        returns.points_body,
-        returns.ranges_m,
-        returns.beams if spaced else np.arange(m),
-        tuple(rule),
-        tuple(settings.least(knot_step_m)),
+    """Cut the returns where the surface ends, eq. (3), and thin each cluster into bins.
+
+    twist_body : (3,) vx, vy [m/s], omega [rad/s] of the base, to undo the motion of the sweep.
+    """
+    beams = len(scan.ranges_m)
+    rule, least = _rules(settings, knot_step_m, sigma_m, fan.beam_step_rad)
+    points, tangents, counts = np.empty((beams, 2)), np.empty((beams, 2)), np.empty(beams)
+    starts = np.empty(beams + 1, np.int64)
+    n, clusters = _see(
+        scan.ranges_m,
+        tuple(fan),
+        twist_body,
+        rule,
+        least,
         bin_m,
         _reach_m(knot_step_m, sigma_m),
         points,

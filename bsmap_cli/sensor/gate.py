@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import lean
-from bsmap_cli.geometry.se2 import Points, Vector
+from bsmap_cli.geometry.compiled import inlined, lean
+from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.sensor.scan import Ranges, Scan
 from bsmap_cli.settings import setting
 
@@ -61,11 +62,52 @@ class Returns:
         return len(self.ranges_m)
 
 
+class Fan(NamedTuple):
+    """What scans of one lidar have in common.
+
+    cosines, sines : (n,) of each beam in the laser frame; used : (n,) bool, outside the sectors in
+    which the robot sees itself. near_m, far_m : which ranges are returns. laser : (3,) x, y [m],
+    theta [rad] of the laser in the base frame. beam_step_rad, beam_time_s : from one beam to the
+    next, a time of 0 where motion is not undone. around : the beams fill a circle.
+    """
+
+    cosines: Vector
+    sines: Vector
+    used: NDArray[np.bool_]
+    near_m: float
+    far_m: float
+    laser: Vector
+    beam_step_rad: float
+    beam_time_s: float
+    around: bool
+
+
+def fan_of(scan: Scan, settings: SensorSettings, knot_step_m: float) -> Fan:
+    """The fan of a scan: mostly that of the scan before."""
+    near, far = range_limits(scan, settings, knot_step_m)
+    return _fan(
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        len(scan.ranges_m),
+        near,
+        far,
+        scan.pose_base_laser,
+        scan.time_increment_s if settings.deskew == "auto" else 0.0,
+        settings.ignore_angles_deg,
+    )
+
+
 @lru_cache(maxsize=64)
-def _beam_table(
-    first_rad: float, step_rad: float, beams: int, ignored_deg: tuple[tuple[float, float], ...]
-) -> tuple[Vector, Vector, NDArray[np.bool_]]:
-    """Cosine, sine and use of each beam of a scan."""
+def _fan(
+    first_rad: float,
+    step_rad: float,
+    beams: int,
+    near_m: float,
+    far_m: float,
+    pose_base_laser: SE2,
+    beam_time_s: float,
+    ignored_deg: tuple[tuple[float, float], ...],
+) -> Fan:
     angles = first_rad + np.arange(beams) * step_rad
     used = np.ones(beams, bool)
     for start_deg, end_deg in ignored_deg:
@@ -73,36 +115,71 @@ def _beam_table(
         if width < 360.0:  # else all around, which the remainder would take for nothing
             width %= 360.0
         used &= (np.degrees(angles) - start_deg) % 360.0 > width
-    return np.cos(angles), np.sin(angles), used
+    return Fan(
+        np.cos(angles),
+        np.sin(angles),
+        used,
+        near_m,
+        far_m,
+        pose_base_laser.as_array(),
+        step_rad,
+        beam_time_s,
+        beams * step_rad > math.tau - 1.5 * step_rad,
+    )
+
+
+@inlined
+def _reverse(
+    points: Points, lengths: Vector, returned: NDArray[np.int64], begin: int, end: int
+) -> None:
+    while begin < end - 1:
+        end -= 1
+        for k in range(2):
+            points[begin, k], points[end, k] = points[end, k], points[begin, k]
+        lengths[begin], lengths[end] = lengths[end], lengths[begin]
+        returned[begin], returned[end] = returned[end], returned[begin]
+        begin += 1
+
+
+@inlined
+def _behind_widest_gap(points: Points, count: int) -> int:
+    widest = -1.0
+    seam = 0
+    for i in range(count):
+        dx, dy = points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1]
+        if i == 0:
+            dx, dy = points[0, 0] - points[count - 1, 0], points[0, 1] - points[count - 1, 1]
+        if dx * dx + dy * dy > widest:
+            widest = dx * dx + dy * dy
+            seam = i
+    return seam
 
 
 @lean
-def _gather(
+def gather(
     ranges: Ranges,
-    cosines: Vector,
-    sines: Vector,
-    used: NDArray[np.bool_],
-    near: float,
-    far: float,
-    laser: Vector,
+    fan: Fan,
     twist: Vector,
-    beam_time: float,
     points: Points,
     lengths: Vector,
     returned: NDArray[np.int64],
 ) -> int:
-    """Write the returns in the base frame of the first ray's instant; their number."""
-    cos, sin = math.cos(laser[2]), math.sin(laser[2])
+    """Write the returns in the base frame of the first ray's instant, as `Returns`; their number.
+
+    twist : (3,) vx, vy [m/s], omega [rad/s] of the base during the sweep.
+    """
+    cos, sin = math.cos(fan.laser[2]), math.sin(fan.laser[2])
+    beam_time = fan.beam_time_s
     moving = beam_time != 0.0 and (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0)
     count = 0
     beams = len(ranges)
     for i in range(beams):
         r = float(ranges[i])
-        if not (used[i] and near <= r <= far):
+        if not (fan.used[i] and fan.near_m <= r <= fan.far_m):
             continue
-        x, y = r * cosines[i], r * sines[i]
-        bx = cos * x - sin * y + laser[0]
-        by = sin * x + cos * y + laser[1]
+        x, y = r * fan.cosines[i], r * fan.sines[i]
+        bx = cos * x - sin * y + fan.laser[0]
+        by = sin * x + cos * y + fan.laser[1]
         if moving:
             elapsed = beam_time * i if beam_time > 0.0 else beam_time * (i - beams + 1)
             turn = twist[2] * elapsed
@@ -116,17 +193,14 @@ def _gather(
         lengths[count] = r
         returned[count] = i
         count += 1
+    if fan.around and count > 2:
+        seam = _behind_widest_gap(points, count)
+        for i in range(seam):
+            returned[i] += beams
+        _reverse(points, lengths, returned, 0, seam)
+        _reverse(points, lengths, returned, seam, count)
+        _reverse(points, lengths, returned, 0, count)
     return count
-
-
-def used_beams(scan: Scan, settings: SensorSettings) -> NDArray[np.bool_]:
-    """(n,) bool: beams outside the sectors in which the robot sees itself."""
-    return _beam_table(
-        scan.angle_min_rad,
-        scan.angle_increment_rad,
-        len(scan.ranges_m),
-        settings.ignore_angles_deg,
-    )[2]
 
 
 def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tuple[float, float]:
@@ -140,35 +214,12 @@ def range_limits(scan: Scan, settings: SensorSettings, knot_step_m: float) -> tu
 
 
 def find_returns(
-    scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector | None = None
+    scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector = STANDING
 ) -> Returns:
     """The returns; `twist_body` (vx, vy [m/s], omega [rad/s]) undoes the motion of the sweep."""
     beams = len(scan.ranges_m)
-    cosines, sines, used = _beam_table(
-        scan.angle_min_rad, scan.angle_increment_rad, beams, settings.ignore_angles_deg
-    )
-    near, far = range_limits(scan, settings, knot_step_m)
     points, lengths = np.empty((beams, 2)), np.empty(beams)
     returned = np.empty(beams, np.int64)
-    deskew = twist_body is not None and settings.deskew == "auto"
-    count = _gather(
-        scan.ranges_m,
-        cosines,
-        sines,
-        used,
-        near,
-        far,
-        scan.pose_base_laser.as_array(),
-        twist_body if twist_body is not None else STANDING,
-        scan.time_increment_s if deskew else 0.0,
-        points,
-        lengths,
-        returned,
-    )
-    points, lengths, returned = points[:count], lengths[:count], returned[:count]
-    if beams * scan.angle_increment_rad > math.tau - 1.5 * scan.angle_increment_rad and count > 2:
-        gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
-        seam = int(np.argmax(gaps))
-        points, lengths = np.roll(points, -seam, axis=0), np.roll(lengths, -seam)
-        returned = np.concatenate((returned[seam:], returned[:seam] + beams))
-    return Returns(points, lengths, returned, scan.angle_increment_rad)
+    fan = fan_of(scan, settings, knot_step_m)
+    count = gather(scan.ranges_m, fan, twist_body, points, lengths, returned)
+    return Returns(points[:count], lengths[:count], returned[:count], fan.beam_step_rad)

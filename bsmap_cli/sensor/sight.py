@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import SE2, Vector
-from bsmap_cli.sensor.gate import NO_RETURN_SHARE, SensorSettings, range_limits, used_beams
+from bsmap_cli.sensor.gate import NO_RETURN_SHARE, STANDING, SensorSettings, fan_of
 from bsmap_cli.sensor.scan import Scan
 
 
@@ -34,26 +34,26 @@ class Sight:
 
 
 def find_sight(
-    scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector | None = None
+    scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector = STANDING
 ) -> Sight:
     """What a scan looked through; `twist_body` (vx, vy [m/s], omega [rad/s]) as in `find_returns`.
 
     Under a constant turn the rays of a sweep stay evenly spaced; what the laser travels during
     the sweep counts as if all rays left from its middle.
     """
-    near, far = range_limits(scan, settings, knot_step_m)
+    fan = fan_of(scan, settings, knot_step_m)
     beams = len(scan.ranges_m)
     ranges = scan.ranges_m.astype(np.float32)
     most = scan.range_max_m * NO_RETURN_SHARE
     with np.errstate(invalid="ignore"):
-        beyond = ranges > (most if 0.0 < most < math.inf else far)
-        silent = ~(ranges >= near) | ~used_beams(scan, settings)
+        beyond = ranges > (most if 0.0 < most < math.inf else fan.far_m)
+        silent = ~(ranges >= fan.near_m) | ~fan.used
     ranges[beyond] = math.inf
     ranges[silent] = math.nan
     laser, step = scan.pose_base_laser, scan.angle_increment_rad
     first = scan.angle_min_rad
-    if twist_body is not None and settings.deskew == "auto" and scan.time_increment_s != 0.0:
-        beam_time = scan.time_increment_s
+    beam_time = fan.beam_time_s
+    if beam_time != 0.0:
         begin = 0.0 if beam_time > 0.0 else -beam_time * (beams - 1)
         middle = begin + 0.5 * beam_time * (beams - 1)
         turn = float(twist_body[2])

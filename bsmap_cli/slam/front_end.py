@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.mapping.scan_levels import scan_levels
 from bsmap_cli.mapping.segmentation import Clusters
-from bsmap_cli.sensor.gate import find_returns
+from bsmap_cli.sensor.gate import STANDING
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
 
@@ -20,14 +20,14 @@ class FrontEnd:
     """Turns scans into clusters, in the order of the log; learns the noise on the way.
 
     sigma_m : deviation of the range noise [m], after the last scan.
-    twist : (3,) velocity (vx, vy [m/s], omega [rad/s]) of the base during the last scan; None for
+    twist : (3,) velocity (vx, vy [m/s], omega [rad/s]) of the base during the last scan; none for
     logs that do not say when each beam was fired.
     """
 
     def __init__(self, settings: SlamSettings) -> None:
         self._settings = settings
         self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
-        self.twist: Vector | None = None
+        self.twist = STANDING
         self._last_stamp_ns: int | None = None
 
     @property
@@ -37,20 +37,16 @@ class FrontEnd:
 
     def clusters(self, scan: Scan, last_step: SE2) -> Sequence[Clusters]:
         """Clusters of one scan, coarse to fine; `last_step` is the motion since the scan before."""
-        settings = self._settings
         self._noise.observe(scan)
         self.twist = self._twist(scan, last_step)
         self._last_stamp_ns = scan.stamp_ns
-        returns = find_returns(scan, settings.sensor, settings.ladder[-1], self.twist)
-        return scan_levels(
-            returns, settings.ladder, settings.segmentation, settings.fitting, self.sigma_m
-        )
+        return scan_levels(scan, self._settings, self.sigma_m, self.twist)
 
-    def _twist(self, scan: Scan, last_step: SE2) -> Vector | None:
+    def _twist(self, scan: Scan, last_step: SE2) -> Vector:
         if self._last_stamp_ns is None:
-            return None
+            return STANDING
         elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)
         sweep = abs(scan.time_increment_s) * len(scan.ranges_m)
         if not 0.0 < sweep <= 1.5 * elapsed:
-            return None
+            return STANDING
         return last_step.as_array() / elapsed

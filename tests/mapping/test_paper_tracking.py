@@ -1,5 +1,7 @@
 """Algorithm 1 as printed: centroids (4)(5), and what becomes of a cluster in the map."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bsmap_cli.config import load_settings
@@ -10,7 +12,7 @@ from bsmap_cli.mapping.centroid_tracking import Tracks, cluster_centroids, track
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.scan_levels import scan_levels
-from bsmap_cli.sensor.gate import Returns
+from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.simulator.simulation import simulate
 from tests.mapping.walls import arc, insert, line, speeds
 
@@ -92,13 +94,16 @@ def test_clusters_with_too_few_points_for_a_curve_are_passed_over():
 
 
 def test_each_level_is_segmented_by_its_own_gamma_abs():
-    """A row of posts 0.2 m apart is one cluster at Delta = 0.4 m and none at 0.1 m."""
-    x = np.arange(0.0, 8.0, 0.2)
-    points = np.column_stack((x, np.full_like(x, 2.0)))
-    returns = Returns(points, np.hypot(*points.T), np.arange(len(x)), 0.004)
-    levels = scan_levels(returns, (0.4, 0.1), PAPER.segmentation, PAPER.fitting, 0.01)
+    """A round wall of which beams meet a point each 0.2 m: one cluster at Delta = 0.4 m only."""
+    scan = Scan(
+        stamp_ns=0,
+        ranges_m=np.full(40, 10.0, np.float32),
+        angle_min_rad=0.0,
+        angle_increment_rad=0.02,
+    )
+    levels = scan_levels(scan, replace(PAPER, ladder=(0.4, 0.1)), 0.01)
     assert [len(level) for level in levels] == [1, 0]
-    assert len(levels[0].points) == len(x)  # nothing is thinned
+    assert len(levels[0].points) == 40  # nothing is thinned
 
 
 def test_known_poses_without_noise_give_the_surfaces():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bsmap_cli.config import load_settings
 from bsmap_cli.mapping.segmentation import SegmentationSettings, find_clusters
-from bsmap_cli.sensor.gate import SensorSettings, find_returns
+from bsmap_cli.sensor.gate import SensorSettings, fan_of
 from bsmap_cli.sensor.scan import Scan
 
 STEP = 0.1
@@ -30,8 +30,8 @@ def clusters_of(ranges, rule=DEFAULT, sigma_m=SIGMA):
         angle_increment_rad=BEAMS[1] - BEAMS[0],
         range_max_m=20.0,
     )
-    returns = find_returns(scan, SensorSettings(), STEP)
-    return find_clusters(returns, rule, knot_step_m=STEP, bin_m=0.0, sigma_m=sigma_m)
+    fan = fan_of(scan, SensorSettings(), STEP)
+    return find_clusters(scan, fan, rule, knot_step_m=STEP, bin_m=0.0, sigma_m=sigma_m)
 
 
 def room(seed, noise_m=SIGMA):

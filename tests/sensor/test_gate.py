@@ -168,7 +168,7 @@ def test_deskew_undoes_an_exact_motion(time_increment_s):
     assert deskewed == pytest.approx(truth[hit], abs=1e-4)
     for skewed in (
         find_returns(scan, SensorSettings(deskew="off"), STEP, first),
-        find_returns(scan, DEFAULT, STEP, None),
+        find_returns(scan, DEFAULT, STEP),
     ):
         assert np.abs(skewed.points_body - truth[hit]).max() > 0.02
 
