@@ -13,7 +13,9 @@ from typing import BinaryIO, Protocol
 
 GZIP_MAGIC = b"\x1f\x8b"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-_FEED_BYTES = 512
+_FEED_BYTES = {GZIP_MAGIC: 8192, ZSTD_MAGIC: 512}
+"""At a time: what these can unpack to is a matter of megabytes."""
+
 _PIECE_BYTES = 1 << 20
 _BUFFER_BYTES = 1 << 17
 
@@ -91,7 +93,7 @@ class _Unpacked(io.RawIOBase):
         return len(data)
 
     def _fill(self) -> None:
-        packed = self._waiting or self._packed.read(_FEED_BYTES)
+        packed = self._waiting or self._packed.read(_FEED_BYTES[self._magic])
         self._waiting = b""
         if self._member is None:
             self._ended = not packed

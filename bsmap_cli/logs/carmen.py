@@ -106,21 +106,21 @@ class CarmenParser:
         return _laser_place([scan for scan in scans if scan.topic == topic])
 
     def _lines(self, report: ReadReport) -> Iterator[_Line]:
-        parsers: dict[bytes, Callable[[list[bytes]], ScanLine]] = {
-            FLASER: lambda words: flaser_line(words, self._options, report),
+        parsers: dict[bytes, Callable[[bytes], ScanLine]] = {
+            FLASER: lambda line: flaser_line(line, self._options, report),
             ROBOTLASER: robotlaser_line,
             RAWLASER: rawlaser_line,
         }
         for source in self._sources:
             for number, line in lines_of(source, report):
-                words = line.split()
-                parse = parsers.get(words[0]) if words else None
+                word = line.split(None, 1)[:1]
+                parse = parsers.get(word[0]) if word else None
                 if parse is not None:
                     try:
-                        yield parse(words)
-                    except (ValueError, IndexError, BadMessageError) as error:
+                        yield parse(line)
+                    except (ValueError, IndexError, OverflowError, BadMessageError) as error:
                         yield bad_line(number, source, error)
-                elif words and (odom := self._other(words)) is not None:
+                elif word and (odom := self._other(line.split())) is not None:
                     yield odom
 
     def _other(self, words: list[bytes]) -> OdomLine | None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.canonical import float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
+from bsmap_cli.logs.plain_numbers import plain_numbers
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.text_log import stamp_ns_of
 
@@ -49,26 +50,39 @@ class OdomLine(NamedTuple):
     robot: Pose
 
 
-def flaser_line(words: list[bytes], options: ReadOptions, report: ReadReport) -> ScanLine:
+def flaser_line(line: bytes, options: ReadOptions, report: ReadReport) -> ScanLine:
     """`FLASER n r1..rn x y theta odom_x odom_y odom_theta ipc_stamp host logger_stamp`."""
-    count = int(words[1])
-    if count < 2 or len(words) < 2 + count + 6 + _TAIL:
-        raise BadMessageError("it has fewer numbers than it claims")
+    numbers, stamp = _flaser_numbers(line)
+    count = len(numbers) - 6
     low, step = _angles(count, options, report)
-    numbers = list(map(float, words[2 : 2 + count + 6]))
-    record = _record(words[2 + count + 6], low, step, 0.0, numbers[:count])
+    record = _record(stamp, low, step, 0.0, numbers[:count])
     return _posed("FLASER", record, numbers[count:])
 
 
-def robotlaser_line(words: list[bytes]) -> ScanLine:
+def _flaser_numbers(line: bytes) -> tuple[list[float], bytes]:
+    """The n + 6 numbers, and the stamp."""
+    head, _, rest = line.strip().partition(b" ")[2].partition(b" ")
+    tail = rest.rsplit(None, _TAIL)
+    numbers = plain_numbers(tail[0]) if len(tail) == _TAIL + 1 else None
+    if numbers is not None and head.isdigit() and len(numbers) == int(head) + 6 >= 8:
+        return numbers, tail[1]
+    words = line.split()  # more behind the stamp, or fewer numbers, or spelt in another way
+    count = int(words[1])
+    if count < 2 or len(words) < 2 + count + 6 + _TAIL:
+        raise BadMessageError("it has fewer numbers than it claims")
+    return list(map(float, words[2 : 2 + count + 6])), words[2 + count + 6]
+
+
+def robotlaser_line(line: bytes) -> ScanLine:
     """`ROBOTLASER1`: a raw line with laser pose, robot pose and five numbers before its stamp."""
+    words = line.split()
     record, poses_at = _self_described(words, gap=11)
     return _posed("ROBOTLASER1", record, list(map(float, words[poses_at : poses_at + 6])))
 
 
-def rawlaser_line(words: list[bytes]) -> ScanLine:
+def rawlaser_line(line: bytes) -> ScanLine:
     """`RAWLASER1 type start fov step maxrange accuracy mode n r.. m rem.. ipc_stamp host ...`."""
-    record, _ = _self_described(words, gap=0)
+    record, _ = _self_described(line.split(), gap=0)
     return ScanLine("RAWLASER1", record, None, None)
 
 

@@ -19,10 +19,10 @@ from bsmap_cli.errors import LogError, UsageError
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.canonical import canonical_pose, float32_ranges
 from bsmap_cli.logs.messages import BadMessageError, LaserRecord
+from bsmap_cli.logs.plain_numbers import plain_numbers
 from bsmap_cli.logs.reader import ReadOptions, ReadReport
 from bsmap_cli.logs.sources import Source
 from bsmap_cli.logs.text_log import TextScan, bad_line, lines_of, place_of, stamp_ns_of
-from bsmap_cli.sensor.scan import Ranges
 
 TOPIC = "csv"
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -70,10 +70,9 @@ class CsvParser:
                     header = self._header(text, source.name)
                     continue
                 try:
-                    cells = _cells(text, header.separator)
-                    scan = self._scan(cells, header, is_whole=line.endswith(b"\n"))
+                    scan = self._scan(text, header, is_whole=line.endswith(b"\n"))
                     yield scan._replace(place=place_of(number, source))
-                except (ValueError, BadMessageError) as error:
+                except (ValueError, OverflowError, BadMessageError) as error:
                     yield bad_line(number, source, error)
 
     def _header(self, text: bytes, source: str) -> _Header:
@@ -100,13 +99,11 @@ class CsvParser:
         ranges_last = ranges == tuple(range(len(names) - len(ranges), len(names)))
         return _Header(columns, ranges, ranges_last, separator)
 
-    def _scan(self, cells: list[bytes], header: _Header, *, is_whole: bool) -> TextScan:
-        if not is_whole and len(cells) < len(header.columns):
+    def _scan(self, text: bytes, header: _Header, *, is_whole: bool) -> TextScan:
+        cells, ranges_m = _row(text, header)
+        width = len(cells) + (len(ranges_m) if header.ranges_last else 0)
+        if not is_whole and width < len(header.columns):
             raise BadMessageError("the last line is cut off")
-        if header.ranges_last:
-            texts = cells[header.ranges[0] :]
-        else:
-            texts = [cells[index] for index in header.ranges if index < len(cells)]
         fields = _Fields(cells, header.columns)
         options = self._options
         record = LaserRecord(
@@ -117,7 +114,7 @@ class CsvParser:
             fields.number("time_increment", 0.0),
             fields.number("range_min", 0.0),
             fields.number("range_max", math.inf),
-            _ranges(texts),
+            float32_ranges(ranges_m),
         )
         return TextScan(
             TOPIC,
@@ -165,22 +162,25 @@ def _text(line: bytes) -> bytes:
     return text if text.strip() else b""
 
 
-def _cells(text: bytes, separator: bytes) -> list[bytes]:
-    """The cells of a row; a comma that separates nothing is a decimal point."""
-    return (text if separator == b"," else text.replace(b",", b".")).split(separator)
+def _row(text: bytes, header: _Header) -> tuple[list[bytes], list[float]]:
+    """The cells of a row, without those of ranges where these end it, and the ranges."""
+    separator, first = header.separator, header.ranges[0]
+    if separator != b",":  # a comma that separates nothing is a decimal point
+        text = text.replace(b",", b".")
+    if header.ranges_last:
+        *cells, rest = text.split(separator, first)
+        numbers = plain_numbers(rest, separator) if len(cells) == first else None
+        if numbers is not None:
+            return cells, numbers
+    cells = text.split(separator)
+    texts = [cells[index] for index in header.ranges if index < len(cells)]
+    others = cells[:first] if header.ranges_last else cells
+    return others, [float(text) if text.strip() else math.nan for text in texts]
 
 
 def _names(text: bytes, separator: bytes) -> list[str]:
     cells = text.split(separator)
     return [cell.strip().decode("utf-8", "replace").lower() for cell in cells]
-
-
-def _ranges(texts: list[bytes]) -> Ranges:
-    try:
-        numbers = list(map(float, texts))
-    except ValueError:
-        numbers = [float(text) if text.strip() else math.nan for text in texts]
-    return float32_ranges(numbers)
 
 
 def is_header(line: bytes) -> bool:
