@@ -87,7 +87,10 @@ def _spanned(
     points: Points, ranges: Vector, beams: Integers, i: int, j: int, rule: GapRule
 ) -> bool:
     """Is the gap between i and j no longer than the spacing of so many beams explains?"""
-    return _apart_m(points, i, j) <= _widest_m(ranges, i, j, beams[j] - beams[i], rule)
+    dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+    if dx * dx + dy * dy <= rule.max_gap_m * rule.max_gap_m:  # most are: no need to ask further
+        return True
+    return magnitude(dx, dy) <= _widest_m(ranges, i, j, beams[j] - beams[i], rule)
 
 
 @lean
