@@ -78,9 +78,9 @@ class _Plain(Silent):
 
 def _has_compiled() -> bool:
     """Whether it was the compiler that took the time: a slow pipe or disk takes some, too."""
-    from bsmap_cli.pipeline.warm_up import freshly_compiled
+    from bsmap_cli.pipeline.compile_ahead import freshly_compiled
 
-    return freshly_compiled() > 0
+    return bool(freshly_compiled())
 
 
 class _Bar(_Plain):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from itertools import chain
 from time import perf_counter
 from typing import Any, Literal, TypeVar
 
@@ -20,6 +21,7 @@ from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.mapping_settings import MappingSettings
+from bsmap_cli.pipeline.compile_ahead import compile_for_slam
 from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
 from bsmap_cli.pipeline.memory_needed import refuse_too_large
 from bsmap_cli.sensor.pose_track import PoseTrack
@@ -130,7 +132,10 @@ def run_slam(
         settings = settings_for_map(settings, old)
         known = KnownMap(old, _settings_for(SlamSettings, settings))
     slam = Slam(_settings_for(SlamSettings, settings), known)
-    for scan in feed:
+    scans = iter(feed)
+    first = next(scans)  # what is wrong with the log is told before anything is compiled
+    compile_for_slam()
+    for scan in chain((first,), scans):
         slam.process(scan)
         if onlooker is not None:
             onlooker.scan(scan, slam)

@@ -27,7 +27,7 @@ def run(*, talk: TalkFlags, json: Json = False) -> None:
     from bsmap_cli.pipeline.warm_up import warm_up
 
     voice = talk.talk()
-    voice.note("compiling what is not compiled yet: the first time that takes half a minute")
+    voice.note("compiling what is not compiled yet: the first time that takes a while")
     done = warm_up()
     seconds = perf_counter() - began
     if json:

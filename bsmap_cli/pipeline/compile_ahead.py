@@ -1,0 +1,106 @@
+"""Compile kernels before they are called, on all cores: the first run waits half as long.
+
+`python -m bsmap_cli.pipeline.compile_ahead FOLDER KERNEL...` is a helper of another process. Both
+go through the same kernels; who first makes a file of its name in the folder compiles it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from bsmap_cli.pipeline.kernel_table import PACKAGE, kernel_table, named, numba_type
+
+MOST_HELPERS = 3  # more would be done before they have started
+
+
+def compile_for_slam() -> None:
+    """Compile all that `slam` needs, unless that has been done or there is but one core.
+
+    Kernels that are missing later, for whatever reason, are compiled as they are called.
+    """
+    names = [name for name, entry in kernel_table().items() if entry.in_slam]
+    if _helpers() and _compile(names[-1]):
+        with suppress(OSError):  # no room for a folder, or no process to be had
+            compile_ahead(names[:-1])
+
+
+def compile_ahead(names: Sequence[str]) -> set[str]:
+    """Compile these kernels where they are not on the disk; the names of all that were compiled."""
+    with TemporaryDirectory(prefix="bsmap-compiling-") as folder:
+        helpers = [_start_helper(folder, names) for _ in range(_helpers())]
+        try:
+            compiled = _compile_share(Path(folder), names)
+            for helper in helpers:
+                compiled.update(helper.communicate()[0].split())
+        finally:
+            for helper in helpers:
+                helper.kill()
+                helper.wait()
+    return compiled
+
+
+def _helpers() -> int:
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    return min(cores - 1, MOST_HELPERS)
+
+
+def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[str]:
+    home = str(Path(sys.modules[PACKAGE].__path__[0]).parent)
+    places = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return subprocess.Popen(
+        [sys.executable, "-m", __spec__.name, folder, *names],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,  # what it cannot compile is compiled when it is called
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+    )
+
+
+def _compile_share(folder: Path, names: Sequence[str]) -> set[str]:
+    """Compile what nobody else has begun with."""
+    compiled: set[str] = set()
+    for name in names:
+        with suppress(FileExistsError):
+            (folder / name).touch(exist_ok=False)
+            compiled.update(_compile(name))
+    return compiled
+
+
+def _compile(name: str) -> set[str]:
+    """Compile a kernel, or find it on the disk; what was compiled with it."""
+    kernel: Any = named(name)
+    before = freshly_compiled()
+    kernel.compile(tuple(map(numba_type, kernel_table()[name].types)))
+    return freshly_compiled() - before
+
+
+def freshly_compiled() -> set[str]:
+    """The kernels that this process has compiled, and not found on the disk."""
+    found = set()
+    for module_name, module in list(sys.modules.items()):
+        if module_name.split(".")[0] != PACKAGE:
+            continue
+        for value in list(vars(module).values()):
+            if hasattr(value, "py_func") and sum(value.stats.cache_misses.values()):
+                function = value.py_func
+                found.add(f"{function.__module__}.{function.__qualname__}")
+    return found
+
+
+def main() -> None:
+    """Be a helper."""
+    folder, *names = sys.argv[1:]
+    print(*_compile_share(Path(folder), names))
+
+
+if __name__ == "__main__":
+    main()
