@@ -1,7 +1,8 @@
 """Compile kernels before they are called, on all cores: the first run waits half as long.
 
 `python -m bsmap_cli.pipeline.compile_ahead FOLDER KERNEL...` is a helper of another process. Both
-go through the same kernels; who first makes a file of its name in the folder compiles it.
+go through the same kernels; who first makes a file of its name in the folder compiles it, and
+writes into the file what was compiled.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ def compile_ahead(names: Sequence[str]) -> set[str]:
     with TemporaryDirectory(prefix="bsmap-compiling-") as folder:
         helpers = [_start_helper(folder, names) for _ in range(_helpers())]
         try:
-            compiled = _compile_share(Path(folder), names)
+            _compile_share(Path(folder), names)
             for helper in helpers:
-                compiled.update(helper.communicate()[0].split())
+                helper.wait()
         finally:
             for helper in helpers:
                 helper.kill()
                 helper.wait()
-    return compiled
+        return {name for note in Path(folder).iterdir() for name in note.read_text().split()}
 
 
 def _helpers() -> int:
@@ -52,27 +53,24 @@ def _helpers() -> int:
     return min(cores - 1, MOST_HELPERS)
 
 
-def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[str]:
+def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[bytes]:
     home = str(Path(sys.modules[PACKAGE].__path__[0]).parent)
     places = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.Popen(
         [sys.executable, "-m", __spec__.name, folder, *names],
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,  # what it cannot compile is compiled when it is called
-        text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
     )
 
 
-def _compile_share(folder: Path, names: Sequence[str]) -> set[str]:
+def _compile_share(folder: Path, names: Sequence[str]) -> None:
     """Compile what nobody else has begun with."""
-    compiled: set[str] = set()
     for name in names:
         with suppress(FileExistsError):
             (folder / name).touch(exist_ok=False)
-            compiled.update(_compile(name))
-    return compiled
+            (folder / name).write_text("\n".join(_compile(name)))
 
 
 def _compile(name: str) -> set[str]:
@@ -99,7 +97,7 @@ def freshly_compiled() -> set[str]:
 def main() -> None:
     """Be a helper."""
     folder, *names = sys.argv[1:]
-    print(*_compile_share(Path(folder), names))
+    _compile_share(Path(folder), names)
 
 
 if __name__ == "__main__":
