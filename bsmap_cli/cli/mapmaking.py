@@ -10,6 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
+from bsmap_cli.cli.compiled_code import start_compiler
 from bsmap_cli.cli.formats import refuse_no_map, refuse_no_trajectory
 from bsmap_cli.cli.inputs import STDIN
 from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
@@ -91,6 +92,7 @@ def make_map(
     old : a map that is gone on with, whose knot step ends the ladder.
     poses : the file that tells where the robot was, so that no odometry is used.
     """
+    start_compiler()
     from bsmap_cli.cli.progress import progress_bar
     from bsmap_cli.evaluation.map_statistics import map_statistics
     from bsmap_cli.logs.open_log import open_log

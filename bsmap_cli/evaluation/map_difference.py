@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.evaluation.near_pairs import Pairs, sort_into_cells
 from bsmap_cli.evaluation.occupancy import FREE, grid_frame, occupancy
+from bsmap_cli.geometry.near_pairs import Pairs, sort_into_cells
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.map_document import LevelSamples, MapDocument
 from bsmap_cli.mapping.sampling import sample_level

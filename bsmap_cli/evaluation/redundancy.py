@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.evaluation.near_pairs import Cells, Pairs, places_near, sort_into_cells
+from bsmap_cli.geometry.near_pairs import Cells, Pairs, places_near, sort_into_cells
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.map_document import PORTION, LevelSamples, MapLevel
 from bsmap_cli.mapping.sampling import sample_level

@@ -35,6 +35,45 @@ ODOMETRY_TYPES = (
     "geometry_msgs/msg/Point",
     "geometry_msgs/msg/Quaternion",
 )
+_NEXT = "=" * 80 + "\nMSG: "
+_TEXTS = {
+    LASER_SCAN_TYPES[0]: f"""
+std_msgs/Header header
+float32 angle_min
+float32 angle_max
+float32 angle_increment
+float32 time_increment
+float32 scan_time
+float32 range_min
+float32 range_max
+float32[] ranges
+float32[] intensities
+{_NEXT}std_msgs/Header
+""",
+    ODOMETRY_TYPES[0]: f"""
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/PoseWithCovariance pose
+geometry_msgs/TwistWithCovariance twist
+{_NEXT}geometry_msgs/PoseWithCovariance
+geometry_msgs/Pose pose
+float64[36] covariance
+{_NEXT}geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+{_NEXT}geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+{_NEXT}geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+{_NEXT}std_msgs/Header
+""",
+}
+_STAMP = "builtin_interfaces/Time stamp\nstring frame_id\n"
 _BODY_START = 4
 """Behind the encapsulation of CDR, behind the sequence number of ROS 1."""
 
@@ -64,6 +103,11 @@ def _layout(order: Literal["<", ">"], *, is_ros1: bool) -> _Layout:
 
 _ROS1 = _layout("<", is_ros1=True)
 _CDR = {b"\0\1": _layout("<", is_ros1=False), b"\0\0": _layout(">", is_ros1=False)}
+
+
+def usual_definition(name: str, *, is_ros1: bool) -> str:
+    """The first of `LASER_SCAN_TYPES` or `ODOMETRY_TYPES` as ROS defines it, with what it holds."""
+    return _TEXTS[name] + ("uint32 seq\n" if is_ros1 else "") + _STAMP
 
 
 def laser_scan_decoder(*, is_ros1: bool) -> Decoder:

@@ -7,6 +7,7 @@ everything else goes through a `rosbags` typestore.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from bsmap_cli.logs.decode_known import (
     ODOMETRY_TYPES,
     laser_scan_decoder,
     odometry_decoder,
+    usual_definition,
 )
 from bsmap_cli.logs.decode_point_cloud import cloud_record
 from bsmap_cli.logs.decoding import Decoder
@@ -81,23 +83,35 @@ def _plain_decoder(channel: Channel, *, last_echo: bool) -> Decoder:
 
 def _typestore_for(channel: Channel) -> Typestore:
     """Types as the log defines them; the usual ones where it defines none, or none to be read."""
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+    from rosbags.typesys import get_types_from_idl
 
-    usual = _usual_typestore(channel.encoding == "ros1")
-    try:
+    with suppress(Exception):  # the parser lets its own and Python's errors through
         text = channel.schema[:_SCHEMA_LIMIT_BYTES].decode()
         if channel.schema_encoding in ("ros2idl", "omgidl"):
             types = {}
             for part in _idl_parts(text):
                 types.update(get_types_from_idl(part))
+            typestore = _typestore_of(types)
         else:
-            types = get_types_from_msg(text, channel.type)
-        typestore = get_typestore(Stores.EMPTY)
-        typestore.register(types)
+            typestore = _typestore_of_text(text, channel.type)
         typestore.get_msgdef(channel.type)
-    except Exception:  # the parser lets its own and Python's errors through
-        return usual
-    return typestore if text.strip() else usual
+        if text.strip():
+            return typestore
+    return _usual_typestore(channel.encoding == "ros1")
+
+
+def _typestore_of(types: Any) -> Typestore:
+    from rosbags.typesys import Stores, get_typestore
+
+    typestore = get_typestore(Stores.EMPTY)
+    typestore.register(types)
+    return typestore
+
+
+def _typestore_of_text(text: str, name: str) -> Typestore:
+    from rosbags.typesys import get_types_from_msg
+
+    return _typestore_of(get_types_from_msg(text, name))
 
 
 @cache
@@ -114,8 +128,11 @@ def _idl_parts(text: str) -> list[str]:
 
 
 def _is_usual(typestore: Typestore, names: tuple[str, ...], is_ros1: bool) -> bool:
-    """Whether all of the named types are defined as ROS has them."""
-    usual = _usual_typestore(is_ros1)
+    """Whether all of the named types are defined as ROS has them.
+
+    These few are compared with a text: to import all that ROS ever defined takes 0.1 s and more.
+    """
+    usual = _typestore_of_text(usual_definition(names[0], is_ros1=is_ros1), names[0])
     return all(
         name in typestore.fielddefs and typestore.fielddefs[name][1] == usual.fielddefs[name][1]
         for name in names

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, kernel, lean
 from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
+from bsmap_cli.geometry.near_pairs import sort_into_cells
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.control_points import fit_control_points
 from bsmap_cli.mapping.curve_map import CurveMap, refresh_spans
@@ -246,24 +247,25 @@ def _joined_weights(
 
 def _followers(curve_map: CurveMap) -> list[tuple[float, int, int, float]]:
     """Pairs of curves whose end and start meet: cost, first, second, gap along [m]; best first."""
-    from scipy.spatial import cKDTree
-
     live, points, tangents = _ends(curve_map)
     step = curve_map.knot_step_m
     if len(live) < 2:
         return []
     reach = step * math.hypot(JOIN_STEPS, JOIN_ASIDE)
-    near = cKDTree(points[:, 0]).query_ball_point(points[:, 1], reach, return_sorted=True)
-    found = []
-    for i, starts in enumerate(np.asarray(near, object).tolist()):
-        for j in starts:
-            gap, (tx, ty) = points[j, 0] - points[i, 1], tangents[i, 1]
-            along = float(gap[0] * tx + gap[1] * ty)
-            aside = abs(float(gap[1] * tx - gap[0] * ty))
-            parallel = float(tangents[j, 0] @ tangents[i, 1])
-            if i != j and aside < JOIN_ASIDE * step and parallel > JOIN_COSINE:
-                found.append((abs(along) + 4.0 * aside, int(live[i]), int(live[j]), along))
-    return sorted(found)
+    starts, ends, onward = points[:, 0], points[:, 1], tangents[:, 1]
+    i, j = sort_into_cells(starts, reach, ends).pairs(ends)
+    gap = starts[j] - ends[i]
+    along = np.einsum("nk,nk->n", gap, onward[i])
+    aside = np.abs(gap[:, 0] * onward[i, 1] - gap[:, 1] * onward[i, 0])
+    follows = (
+        (i != j)
+        & (np.hypot(gap[:, 0], gap[:, 1]) <= reach)
+        & (aside < JOIN_ASIDE * step)
+        & (np.einsum("nk,nk->n", tangents[j, 0], onward[i]) > JOIN_COSINE)
+    )
+    cost = np.abs(along) + 4.0 * aside
+    columns = (cost, live[i], live[j], along)
+    return sorted(zip(*(column[follows].tolist() for column in columns), strict=True))
 
 
 def _join_ends(curve_map: CurveMap) -> int:

@@ -145,7 +145,7 @@ def test_the_wider_knot_step_is_the_tolerance():
 def test_few_pairs_at_a_time_tell_the_same(monkeypatch):
     aside = moved(without(ROOM, 1), SE2(0.03, -0.02, 0.01))
     whole = map_difference(ROOM, aside, HERE).as_json()
-    monkeypatch.setattr("bsmap_cli.evaluation.near_pairs.MOST_PAIRS", 500.0)
+    monkeypatch.setattr("bsmap_cli.geometry.near_pairs.MOST_PAIRS", 500.0)
     assert map_difference(ROOM, aside, HERE).as_json() == whole
 
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.evaluation.map_statistics import map_statistics, sizes_of
-from bsmap_cli.evaluation.near_pairs import sort_into_cells
 from bsmap_cli.evaluation.redundancy import redundancy
+from bsmap_cli.geometry.near_pairs import sort_into_cells
 from bsmap_cli.mapping.map_document import MapDocument, MapLevel
 from bsmap_cli.mapping.map_file import read_map_with_sizes, write_map
 from bsmap_cli.mapping.sampling import sample_level

@@ -9,6 +9,7 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.logs.decode_known import LASER_SCAN_TYPES, ODOMETRY_TYPES, usual_definition
 from tests.logs.making import (
     SCAN,
     SECOND_NS,
@@ -30,6 +31,16 @@ def drive(tmp_path, messages, **options):
     path = tmp_path / "log.mcap"
     path.write_bytes(ros_mcap(messages, ROS))
     return read(path, **options)
+
+
+@pytest.mark.parametrize("types", [LASER_SCAN_TYPES, ODOMETRY_TYPES], ids=lambda types: types[0])
+@pytest.mark.parametrize("store", [Stores.ROS1_NOETIC, Stores.ROS2_FOXY, Stores.LATEST])
+def test_what_is_decoded_without_rosbags_is_what_ros_defines(types, store):
+    ours, ros = get_typestore(Stores.EMPTY), get_typestore(store)
+    text = usual_definition(types[0], is_ros1=store is Stores.ROS1_NOETIC)
+    ours.register(get_types_from_msg(text, types[0]))
+    for name in types:
+        assert ours.fielddefs[name] == ros.fielddefs[name]
 
 
 def test_first_and_last_echo(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Annotated, Any
 
+from bsmap_cli.cli.compiled_code import start_compiler
 from bsmap_cli.cli.formats import refuse_no_trajectory
 from bsmap_cli.cli.inputs import STDIN, log_sources, read_map_file
 from bsmap_cli.cli.losses import exit_code, reading_losses, tell_warnings
@@ -54,6 +55,7 @@ def run(
       bsmap localize run.mcap --map map.bsm --traj where.tum
       bsmap localize run.mcap --map map.bsm --json
     """
+    start_compiler()
     from bsmap_cli.cli.progress import progress_bar
     from bsmap_cli.logs.open_log import open_log
     from bsmap_cli.pipeline import run_localize
