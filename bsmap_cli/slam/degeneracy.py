@@ -24,6 +24,17 @@ def _certain(jacobian: Points, x: float, y: float, turn: float) -> float:
     return total
 
 
+@inlined
+def _all_observed(hessian: Points, lever: float, least: float) -> bool:
+    """Do all eigenvalues exceed `least`? Then what it leaves is positive definite, by Sylvester."""
+    a, b, c = hessian[0, 0] - least, hessian[0, 1], hessian[0, 2] / lever
+    d, e = hessian[1, 1] - least, hessian[1, 2] / lever
+    f = hessian[2, 2] / (lever * lever) - least
+    minor = a * d - b * b
+    whole = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
+    return a > 0.0 and minor > 0.0 and whole > 0.0
+
+
 @part
 def keep_unobserved(
     hessian: Points,
@@ -43,8 +54,10 @@ def keep_unobserved(
     there is taken out of `hessian`. A direction is observed with information above `least`, or with
     `certain` of such that no noise explains.
     """
-    scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
     lever = max(lever_m, 1e-9)
+    if _all_observed(hessian, lever, least):  # mostly: no need to know the directions
+        return 0
+    scaled, values, vectors = hessian.copy(), np.empty(3), np.empty((3, 3))
     for i in range(3):
         scaled[i, 2] /= lever
         scaled[2, i] /= lever

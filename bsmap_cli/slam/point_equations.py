@@ -58,6 +58,34 @@ def _match(
     return found, row, f, ey * ux - ex * uy, ux, uy
 
 
+@inlined
+def _step_on(
+    level: LevelArrays,
+    matrix: Points,
+    points: Points,
+    pose: Vector,
+    cos: float,
+    sin: float,
+    rows: NDArray[np.int64],
+    places: Vector,
+    polynomial: Points,
+) -> None:
+    """One Newton step of all foot points that are known.
+
+    Apart from the sums, so that a processor works on several of these short steps at a time.
+    """
+    degree = matrix.shape[0] - 1
+    for j in range(len(points)):
+        row = rows[j]
+        if row >= 0:
+            px = cos * points[j, 0] - sin * points[j, 1] + pose[0]
+            py = sin * points[j, 0] + cos * points[j, 1] + pose[1]
+            low, high = usable_rows(level, level.owner[row], degree)
+            rows[j], places[j] = foot_point(
+                level.points, matrix, row, places[j], low, high, px, py, 1, polynomial
+            )
+
+
 @lean_part
 def accumulate(  # noqa: PLR0915
     level: LevelArrays,
@@ -93,6 +121,7 @@ def accumulate(  # noqa: PLR0915
     inliers = squares = lever = total = feigned = 0.0
     f = residual = ux = uy = 0.0
     noise = TANGENT_NOISE / (knot_step_m * knot_step_m)
+    _step_on(level, matrix, points, pose, cos, sin, rows, places, polynomial)
     neighbour: Any = np.int64(-1)  # -1 as a literal would be compiled for itself
     for j in range(len(points)):
         qx = cos * points[j, 0] - sin * points[j, 1]
@@ -104,7 +133,7 @@ def accumulate(  # noqa: PLR0915
         row = rows[j]
         if row >= 0:
             found, row, f, residual, ux, uy = _match(
-                level, matrix, knot_step_m, row, places[j], 1, px, py, tx, ty, polynomial
+                level, matrix, knot_step_m, row, places[j], 0, px, py, tx, ty, polynomial
             )
             found = found and abs(residual) <= gate_m
         else:
