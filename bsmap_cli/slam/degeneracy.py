@@ -32,7 +32,7 @@ def _all_observed(hessian: Points, lever: float, least: float) -> bool:
     f = hessian[2, 2] / (lever * lever) - least
     minor = a * d - b * b
     whole = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
-    return a > 0.0 and minor > 0.0 and whole > 0.0
+    return bool(a > 0.0 and minor > 0.0 and whole > 0.0)
 
 
 @part
