@@ -102,7 +102,8 @@ def _layout(order: Literal["<", ">"], *, is_ros1: bool) -> _Layout:
 
 
 _ROS1 = _layout("<", is_ros1=True)
-_CDR = {b"\0\1": _layout("<", is_ros1=False), b"\0\0": _layout(">", is_ros1=False)}
+_CDR = {1: _layout("<", is_ros1=False), 0: _layout(">", is_ros1=False)}
+"""By the second byte of the encapsulation; the first is 0."""
 
 
 def usual_definition(name: str, *, is_ros1: bool) -> str:
@@ -175,10 +176,10 @@ def odometry_decoder(*, is_ros1: bool) -> Decoder:
 
 
 def _cdr_layout(payload: bytes | memoryview) -> _Layout:
-    kind = bytes(payload[:2])
-    if kind not in _CDR:
-        raise BadMessageError(f"the encapsulation {kind.hex()} is not plain CDR")
-    return _CDR[kind]
+    layout = _CDR.get(payload[1]) if len(payload) > 1 and payload[0] == 0 else None
+    if layout is None:
+        raise BadMessageError(f"the encapsulation {payload[:2].hex()} is not plain CDR")
+    return layout
 
 
 class _Frames:

@@ -52,7 +52,7 @@ def ros_decoder(channel: Channel, *, last_echo: bool) -> Decoder:
     decode = _plain_decoder(channel, last_echo=last_echo)
 
     def decode_packed(payload: bytes | memoryview) -> Record:
-        if payload[:4] != ZSTD_MAGIC:
+        if not payload or payload[0] != ZSTD_MAGIC[0] or payload[:4] != ZSTD_MAGIC:
             return decode(payload)
         try:
             return decode(unpack_chunk(bytes(payload), "zstd", CHUNK_LIMIT_BYTES, is_cut=False))

@@ -102,16 +102,18 @@ class McapContainer:
 def _chunk_messages(data: memoryview, channels: ChannelTable) -> Iterator[RawMessage]:
     position, end = 0, len(data)
     wanted = channels.wanted
+    declared, message = (int(Opcode.SCHEMA), int(Opcode.CHANNEL)), int(Opcode.MESSAGE)
     while position + FRAME.size <= end:
         opcode, length = FRAME.unpack_from(data, position)
         start = position + FRAME.size
         position = start + length
         if position > end:
             return
-        if opcode == Opcode.MESSAGE and length >= MESSAGE.size:
-            channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(data, start)
-            channel = wanted.get(channel_id)
-            if channel is not None:
-                yield channel, log_time_ns, data[start + MESSAGE.size : position]
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+        if opcode == message:
+            if length >= MESSAGE.size:
+                channel_id, log_time_ns = MESSAGE.unpack_from(data, start)
+                channel = wanted.get(channel_id)
+                if channel is not None:
+                    yield channel, log_time_ns, data[start + MESSAGE.size : position]
+        elif opcode in declared:
             channels.declare(opcode, bytes(data[start:position]))

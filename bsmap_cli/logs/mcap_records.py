@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")
-MESSAGE = struct.Struct("<HIQQ")
+MESSAGE = struct.Struct("<H4xQ8x")  # channel, time of recording [ns]
 _CHUNK = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
 _FOOTER = struct.Struct("<QQI")
@@ -98,7 +98,7 @@ class ChannelTable:
     def message(self, payload: bytes) -> Iterator[RawMessage]:
         """The message of a record outside of chunks, if its channel is wanted."""
         if len(payload) >= MESSAGE.size:
-            channel_id, _, log_time_ns, _ = MESSAGE.unpack_from(payload)
+            channel_id, log_time_ns = MESSAGE.unpack_from(payload)
             if channel_id in self.wanted:
                 yield self.wanted[channel_id], log_time_ns, memoryview(payload)[MESSAGE.size :]
 

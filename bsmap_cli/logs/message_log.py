@@ -44,7 +44,9 @@ class MessageLog(DrawnLog):
                     break
                 survey.count(channel, log_time_ns)
                 if not is_judged and channel in self._decoders:
-                    is_judged = self._preview.add(self._decoded(channel, log_time_ns, payload))
+                    is_judged = self._preview.add(
+                        _decoded(*self._decoders[channel], channel, log_time_ns, payload)
+                    )
         return survey.info()
 
     def _draw(self) -> Generator[Scan, None, None]:
@@ -91,15 +93,9 @@ class MessageLog(DrawnLog):
     def _events(self) -> Generator[Event, None, None]:
         with closing(self._raw(wants_all=False)) as messages:
             for channel, log_time_ns, payload in messages:
-                if channel in self._decoders:
-                    yield self._decoded(channel, log_time_ns, payload)
-
-    def _decoded(self, channel: Channel, log_time_ns: int, payload: bytes | memoryview) -> Event:
-        kind, decode = self._decoders[channel]
-        try:
-            return Event(channel, kind, log_time_ns, decode(payload))
-        except BadMessageError as error:
-            return Event(channel, kind, log_time_ns, error)
+                found = self._decoders.get(channel)
+                if found is not None:
+                    yield _decoded(*found, channel, log_time_ns, payload)
 
     def _raw(self, *, wants_all: bool) -> Generator[RawMessage, None, None]:
         def wants(channel: Channel) -> bool:
@@ -112,6 +108,19 @@ class MessageLog(DrawnLog):
 
         for container in self._containers:
             yield from container.messages(wants, self.report)
+
+
+def _decoded(
+    kind: Kind,
+    decode: Decoder,
+    channel: Channel,
+    log_time_ns: int,
+    payload: bytes | memoryview,
+) -> Event:
+    try:
+        return Event(channel, kind, log_time_ns, decode(payload))
+    except BadMessageError as error:
+        return Event(channel, kind, log_time_ns, error)
 
 
 def _emptied(events: list[Event]) -> Iterator[Event]:

@@ -79,15 +79,15 @@ class ScanStream:
     def scans(self, events: Iterable[Event]) -> Iterator[Scan]:
         """The scans of the chosen topics; bad ones are counted and passed over."""
         for channel, kind, log_time_ns, record in events:
-            if isinstance(record, BadMessageError):
-                self._pass_over(channel.topic, kind, record)
-            elif isinstance(record, LaserRecord | CloudRecord):
+            if isinstance(record, (LaserRecord, CloudRecord)):  # a union would be made each time
                 if channel.topic in self._topics and not self._queue(
                     channel.topic, log_time_ns, record
                 ):
                     break
             elif isinstance(record, OdometryRecord):
                 self._motion.take_odometry(channel.topic, log_time_ns, record)
+            elif isinstance(record, BadMessageError):
+                self._pass_over(channel.topic, kind, record)
             else:
                 self._motion.take_transforms(log_time_ns, record)
                 self._mountings.take_late(record)
