@@ -38,8 +38,7 @@ class SE2(NamedTuple):
     @classmethod
     def from_array(cls, xytheta: Iterable[float]) -> SE2:
         """From three numbers x [m], y [m], theta [rad]; theta is wrapped."""
-        known = xytheta.tolist() if isinstance(xytheta, np.ndarray) else xytheta
-        x, y, theta = map(float, known)
+        x, y, theta = xytheta.tolist() if isinstance(xytheta, np.ndarray) else map(float, xytheta)
         return cls(x, y, wrap_angle(theta))
 
     def as_array(self) -> Vector:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+from array import array
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,6 +34,8 @@ def float32_value(value: float) -> float:
 
 def float32_ranges(ranges_m: Sequence[float] | NDArray[np.float64]) -> Ranges:
     """(n,) ranges [m] rounded to float32; beyond its range infinities."""
+    if isinstance(ranges_m, list):  # twice as fast as numpy reads it
+        return np.frombuffer(array("f", ranges_m), np.float32)
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(ranges_m, dtype=np.float64).astype(np.float32)
 

@@ -19,6 +19,8 @@ class Levels(Sequence[Level]):
     def __getitem__(self, index: slice) -> list[Level]: ...
 
     def __getitem__(self, index: int | slice) -> Level | list[Level]:
+        if index == -1:  # the finest, which every scan asks for
+            return self._at(len(self) - 1)
         places = range(len(self))[index]
         return self._at(places) if isinstance(places, int) else [self._at(k) for k in places]
 

@@ -189,7 +189,7 @@ def register(
     sigma_m : range noise [m].
     """
     step = curve_map.knot_step_m
-    pose, hessian, tally = start_pose.copy(), np.zeros((3, 3)), np.zeros(5)
+    pose, hessian, tally = start_pose.copy(), np.empty((3, 3)), np.empty(5)
     steps, degenerate = _register(
         tuple(curve_map.arrays),
         curve_map.matrix,
@@ -212,12 +212,5 @@ def register(
     )
     n = len(clusters.points)
     inliers, squares_m2 = float(tally[0]), float(tally[1])
-    return RegistrationResult(
-        pose=pose,
-        information=hessian,
-        inlier_ratio=inliers / max(n, 1),
-        rms_m=math.sqrt(squares_m2 / max(inliers, 1.0)),
-        iterations=steps,
-        degenerate=degenerate,
-        points=n,
-    )
+    ratio, rms_m = inliers / max(n, 1), math.sqrt(squares_m2 / max(inliers, 1.0))
+    return RegistrationResult(pose, hessian, ratio, rms_m, steps, degenerate, n)

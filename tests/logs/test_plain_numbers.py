@@ -1,9 +1,11 @@
 """Rows of numbers, read as `float` would read their words, or left to it."""
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bsmap_cli.logs.canonical import float32_ranges
 from bsmap_cli.logs.plain_numbers import plain_numbers
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -42,3 +44,14 @@ def test_other_spellings_are_left_to_float(text):
 
 def test_no_text_holds_no_number():
     assert plain_numbers(b"") == []
+
+
+@given(st.lists(st.one_of(st.floats(), st.integers(-(10**30), 10**30)), max_size=20))
+@example([1e39, -1e39, float("nan"), 16777217, 3.4028235e38, 1e-46])
+def test_ranges_become_float32_as_numpy_rounds(numbers):
+    with np.errstate(over="ignore", invalid="ignore"):
+        expected = np.array(numbers, np.float64).astype(np.float32)
+    found = float32_ranges(numbers)
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(float32_ranges(np.array(numbers, np.float64)), expected)
