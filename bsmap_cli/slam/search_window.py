@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bsmap_cli.geometry.se2 import Points, Vector
 
@@ -32,6 +34,14 @@ def heights_for(reach: int) -> int:
     return 1 + max(0, math.ceil(math.log2(reach + 0.5)))
 
 
+@lru_cache(maxsize=64)
+def _offsets(steps: int) -> NDArray[np.int64]:
+    """0, -1, 1, -2, 2 ...: what lies near the guess first, as a good score spares much else."""
+    offsets = np.arange(1, 2 * steps + 2) // 2
+    offsets[1::2] *= -1
+    return offsets
+
+
 def window_grid(
     cell_m: float,
     points: Points,
@@ -47,10 +57,7 @@ def window_grid(
     radius = float(np.hypot(points[:, 0], points[:, 1]).max())
     turn = cell_m / max(radius, 4.0 * cell_m)
     steps = math.ceil(min(window.reach_rad, math.pi) / turn)
-    # what lies near the guess is tried first: a good score spares much of the rest
-    offsets = np.arange(1, 2 * steps + 2) // 2
-    offsets[1::2] *= -1
-    angles = window.centre[2] + offsets * turn
+    angles = window.centre[2] + _offsets(steps) * turn
     discs = np.zeros((len(angles), 3))
     if barred is not None:
         discs[:, :2] = (barred.pose[:2] - window.centre[:2]) / cell_m
