@@ -48,6 +48,8 @@ def compile_ahead(names: Sequence[str]) -> set[str]:
 
 
 def _helpers() -> int:
+    if not Path(sys.executable or "").name.startswith("python"):
+        return 0  # another program that holds Python: it must not be started anew
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     return min(cores - 1, MOST_HELPERS)
