@@ -148,7 +148,9 @@ def _adjoin(
     """
     gap = _apart_m(points, i, j)
     before = max(spacing_m * (beams[j] - beams[i]), NOISE_GAPS * rule.sigma_m)
-    return gap <= _widest_m(ranges, i, j, 1, rule) and gap <= rule.rel_gap * before
+    return gap <= rule.rel_gap * before and (
+        gap <= rule.max_gap_m or gap <= _widest_m(ranges, i, j, 1, rule)
+    )
 
 
 @inlined
@@ -237,7 +239,8 @@ def cut_surfaces(
         if found >= 0:
             gap = _apart_m(points, last, found)
             length += gap
-            spacing = gap / (beams[found] - beams[last])
+            beams_on = beams[found] - beams[last]
+            spacing = gap if beams_on == 1 else gap / beams_on
         else:
             if is_surface(end - start, length, least):
                 bounds[surfaces] = start

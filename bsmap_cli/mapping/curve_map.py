@@ -82,11 +82,11 @@ class CurveMap:
     folded : there is no index of the spans for now, see `fold`.
     """
 
-    def __init__(self, knot_step_m: float, degree: int, *, rows: int = 2048) -> None:
+    def __init__(self, knot_step_m: float, degree: int, *, rows: int = 1024) -> None:
         self.knot_step_m = knot_step_m
         self.degree = degree
         self.matrix = basis_matrix(degree)
-        self.arrays = _empty_level(64, rows, 4096)
+        self.arrays = _empty_level(64, rows, 2048)
         self.tracks: Tracks | None = None
         self.folded = False
 

@@ -1,8 +1,7 @@
 """Compile kernels before they are called, on all cores: the first run waits half as long.
 
-`python -m bsmap_cli.pipeline.compile_ahead FOLDER KERNEL...` is a helper of another process. Both
-go through the same kernels; who first makes a file of its name in the folder compiles it, and
-writes into the file what was compiled.
+Helpers are processes that go through the same kernels; who first makes a file of a kernel's name in
+a folder of theirs compiles it, and writes into the file what was compiled.
 """
 
 from __future__ import annotations
@@ -19,6 +18,15 @@ from typing import Any
 from bsmap_cli.pipeline.kernel_table import PACKAGE, kernel_table, named, numba_type
 
 MOST_HELPERS = 3  # more would be done before they have started
+HELPER = f"""
+import sys
+sys.path.insert(0, sys.argv[1])
+import {PACKAGE}
+sys.path.append(sys.path.pop(0))
+from {__name__} import help_compiling
+help_compiling(*sys.argv[2:])
+"""
+"""The same package as here, wherever it lies, and else what Python finds by itself."""
 
 
 def compile_for_slam() -> None:
@@ -57,13 +65,12 @@ def _helpers() -> int:
 
 def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[bytes]:
     home = str(Path(sys.modules[PACKAGE].__path__[0]).parent)
-    places = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
     return subprocess.Popen(
-        [sys.executable, "-m", __spec__.name, folder, *names],
+        # -P: what lies in the working folder is none of its modules
+        [sys.executable, "-P", "-c", HELPER, home, folder, *names],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,  # what it cannot compile is compiled when it is called
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
     )
 
 
@@ -96,11 +103,6 @@ def freshly_compiled() -> set[str]:
     return found
 
 
-def main() -> None:
+def help_compiling(folder: str, *names: str) -> None:
     """Be a helper."""
-    folder, *names = sys.argv[1:]
     _compile_share(Path(folder), names)
-
-
-if __name__ == "__main__":
-    main()
