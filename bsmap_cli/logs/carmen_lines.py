@@ -56,7 +56,7 @@ def flaser_line(line: bytes, options: ReadOptions, report: ReadReport) -> ScanLi
     count = len(numbers) - 6
     low, step = _angles(count, options, report)
     record = _record(stamp, low, step, 0.0, numbers[:count])
-    return _posed("FLASER", record, numbers[count:])
+    return _posed("FLASER", record, list(map(float, numbers[count:])))
 
 
 def _flaser_numbers(line: bytes) -> tuple[list[float], bytes]:

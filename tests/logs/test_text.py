@@ -156,6 +156,19 @@ def test_a_log_of_bad_lines_alone(tmp_path):
         read(written(tmp_path, b"FLASER 9 1 2 3\n" * 30_000))
 
 
+@pytest.mark.parametrize("more", ["", " behind the stamp"])
+@pytest.mark.parametrize(
+    "numbers", ["1 2.5 3 4 0 3 4 0", "1. 2.5  3.0 +4 0 3\t4 0.", "1e0 25e-1 3 4 0 3 4 -0"]
+)
+def test_numbers_of_a_line_in_any_spelling(tmp_path, numbers, more):
+    (scan,), report = read(written(tmp_path, f"FLASER 2 {numbers} 100.5 host 0.1{more}\n"))
+    assert report.scans_skipped == 0
+    assert scan.ranges_m.tolist() == [1.0, 2.5]
+    assert scan.pose_odom_base == SE2(3.0, 4.0, 0.0)
+    assert all(type(value) is float for value in scan.pose_odom_base)
+    assert scan.stamp_ns == 100_500_000_000
+
+
 def test_corrected_logs_tell_no_place(tmp_path):
     """The first triple is a pose of another map: it drifts from the odometry."""
     drift = iter(range(1000))
