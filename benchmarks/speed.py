@@ -69,10 +69,21 @@ def on_one_core(command: list[str]) -> dict[str, Any]:
     return found
 
 
-def medians(command: list[str], runs: int) -> dict[str, Any]:
-    """The median of each figure over `runs` runs; one more comes first and is not counted."""
-    reports = [on_one_core(command) for _ in range(runs + 1)][1:]
-    return _median_of(reports)
+def measured_in_turn(commands: dict[str, list[str]], runs: int) -> dict[str, dict[str, Any]]:
+    """The median of each figure over `runs` rounds; one more comes first and is not counted.
+
+    In each round every command runs once: where the machine is slower for a while, it is so for
+    all of them. A command that does not run is left out.
+    """
+    reports: dict[str, list[dict[str, Any]]] = {name: [] for name in commands}
+    for _ in range(runs + 1):
+        for name in list(reports):
+            try:
+                reports[name].append(on_one_core(commands[name]))
+            except (OSError, subprocess.CalledProcessError):
+                print(f"  {name} does not run: {' '.join(commands[name])}", file=sys.stderr)
+                del reports[name]
+    return {name: _median_of(found[1:]) for name, found in reports.items()}
 
 
 def _median_of(values: list[Any]) -> Any:
@@ -121,36 +132,32 @@ def _matrix(step: SE2) -> Any:
     return matrix
 
 
-def measure_log(
-    log: Path, folder: Path, peers_python: str, runs: int
-) -> Iterator[tuple[str, dict[str, Any]]]:
+def measure_log(log: Path, folder: Path, peers_python: str, runs: int) -> dict[str, dict[str, Any]]:
     """Each configuration of `slam`, then each peer: name and figures, with the error in cm."""
     case = recorded_case(log, odometry=True)
     reference: Trajectory | Relations | None = case.truth or case.relations
+    points = folder / "points.npz"
+    stamps = write_points(log, points).stamps_ns
+    commands, poses = {}, {}
     for name, changes in CONFIGURATIONS.items():
-        poses = folder / "poses.tum"
-        command = [sys.executable, str(HERE / "measured_run.py"), str(log), "--traj", str(poses)]
-        for change in changes:
-            command += ["--set", change]
-        figures = medians(command, runs)
-        with poses.open(encoding="utf-8") as stream:
-            figures["error_cm"] = 100.0 * trajectory_figure(read_tum(stream), reference)
-        yield name, figures
-    held, found = folder / "points.npz", folder / "poses.npy"
-    stamps = write_points(log, held).stamps_ns
+        poses[name] = folder / f"{len(poses)}.tum"
+        settings = [part for change in changes for part in ("--set", change)]
+        run = [sys.executable, str(HERE / "measured_run.py"), str(log), "--traj", str(poses[name])]
+        commands[name] = [*run, *settings]
     for peer in PEERS:
-        command = [peers_python, str(HERE / "measured_peer.py"), peer, str(held), str(found)]
-        try:
-            figures = medians(command, runs)
-        except (OSError, subprocess.CalledProcessError):
-            print(
-                f"  {peer} does not run with {peers_python}: pip install kiss-icp small_gicp",
-                file=sys.stderr,
-            )
-            continue
-        figures["tracking_scans_per_second"] = len(stamps) / figures["seconds"]
-        error = trajectory_figure(Trajectory(stamps, np.load(found)), reference)
-        yield peer, {**figures, "error_cm": 100.0 * error}
+        poses[peer] = folder / f"{len(poses)}.npy"
+        run = [peers_python, str(HERE / "measured_peer.py"), peer, str(points), str(poses[peer])]
+        commands[peer] = run
+    rows = measured_in_turn(commands, runs)
+    for name, figures in rows.items():
+        if name in PEERS:
+            figures["tracking_scans_per_second"] = len(stamps) / figures["seconds"]
+            found = Trajectory(stamps, np.load(poses[name]))
+        else:
+            with poses[name].open(encoding="utf-8") as stream:
+                found = read_tum(stream)
+        figures["error_cm"] = 100.0 * trajectory_figure(found, reference)
+    return rows
 
 
 def print_log(name: str, rows: dict[str, dict[str, Any]]) -> None:
@@ -201,8 +208,7 @@ def main() -> None:
         if not arguments.no_scenes:
             logs = [*simulated_logs(folder), *logs]
         for log in logs:
-            measuring = measure_log(log, folder, arguments.peers_python, arguments.runs)
-            rows = dict(measuring)
+            rows = measure_log(log, folder, arguments.peers_python, arguments.runs)
             found["logs"][log.name] = rows
             print_log(log.name, rows)
     if arguments.json:
