@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from bsmap_cli.geometry.compiled import inlined
+from bsmap_cli.geometry.compiled_poses import Pose
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.sensor.sight import Sight
@@ -24,6 +28,18 @@ class KeyframeSettings:
         minimum=0.0,
         maximum=1.0,
     )
+
+
+class KeyframeRule(NamedTuple):
+    """Way and turn that make a keyframe, for compiled code."""
+
+    distance_m: float
+    angle_rad: float
+
+
+def keyframe_rule(settings: KeyframeSettings, finest_step_m: float) -> KeyframeRule:
+    """The settings for a map of this knot step."""
+    return KeyframeRule(settings.distance * finest_step_m, math.radians(settings.angle_deg))
 
 
 @dataclass(slots=True)
@@ -56,8 +72,7 @@ def every_nth(knot_step_m: float, finest_step_m: float) -> int:
     return max(1, round(knot_step_m / finest_step_m))
 
 
-def is_keyframe(step: SE2, settings: KeyframeSettings, finest_step_m: float) -> bool:
+@inlined
+def is_keyframe(step: Pose, rule: KeyframeRule) -> bool:
     """Has the base moved or turned enough since the last keyframe? With 0, every scan has."""
-    return math.hypot(step.x, step.y) >= settings.distance * finest_step_m or abs(
-        step.theta
-    ) >= math.radians(settings.angle_deg)
+    return magnitude(step[0], step[1]) >= rule.distance_m or abs(step[2]) >= rule.angle_rad

@@ -43,27 +43,28 @@ def register_near(
     prior_information: Points,
     *,
     enough: float,
+    finest: RegistrationResult | None = None,
     sigma_m: float,
     settings: RegistrationSettings,
 ) -> RegistrationResult:
     """From a pose that is nearly right: on the finest level, down the ladder where that fails.
 
     enough : share of the points, 0 to 1, that must lie on the finest level to leave it at that.
+    finest : what is found there, where that is known already.
 
     Not for closures: what the finest level explains from a searched pose may be beside the place.
     """
-    if len(levels) > 1:
-        finest = register(
-            levels[-1],
-            clusters[-1],
-            start_pose,
-            prior_pose,
-            prior_information,
-            sigma_m=sigma_m,
-            settings=settings,
-        )
-        if finest.inlier_ratio >= enough and not finest.degenerate:
-            return finest
+    finest = finest or register(
+        levels[-1],
+        clusters[-1],
+        start_pose,
+        prior_pose,
+        prior_information,
+        sigma_m=sigma_m,
+        settings=settings,
+    )
+    if len(levels) == 1 or (finest.inlier_ratio >= enough and not finest.degenerate):
+        return finest
     return register_down(
         levels,
         clusters,
@@ -83,12 +84,13 @@ def track_down(
     prior_information: Points,
     *,
     enough: float,
+    finest: RegistrationResult | None,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
     """Register the scan that follows the last one, by the method that is set.
 
-    enough : as in `register_near`; scans that follow each other closely begin within reach of the
+    enough, finest : as in `register_near`; scans that follow each other closely begin within reach of the
     finest level, and most end there. Where curves are registered to curves, the points say in the
     end how well the pose fits.
     """
@@ -101,6 +103,7 @@ def track_down(
             prior_pose,
             prior_information,
             enough=enough,
+            finest=finest,
             sigma_m=sigma_m,
             settings=settings.registration,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,13 +10,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.geometry.compiled_poses import Pose
+from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.sight import Sight
+from bsmap_cli.slam.following import Followed, Follower
 from bsmap_cli.slam.keyframes import Keyframe, is_keyframe
-from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
-from bsmap_cli.slam.prediction import Cadence, Predictor
+from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan, share_enough
+from bsmap_cli.slam.prediction import (
+    Cadence,
+    Motion,
+    moved_on,
+    told,
+    unknown_motion,
+    worst_sigma_m,
+)
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.submap import Submap
 
@@ -53,15 +63,17 @@ class LocalSlam:
     _explained: float = 1.0
     _overlap: float = 0.0
     _cadence: Cadence = field(default_factory=Cadence)
-    _predictor: Predictor = field(init=False)
+    _motion: Motion = field(init=False)
+    _follower: Follower = field(init=False)
 
     def __post_init__(self) -> None:
-        self._predictor = Predictor(self.settings.prediction, self.settings.ladder[-1])
+        self._motion = unknown_motion(self.settings.prediction, self.settings.ladder[-1])
+        self._follower = Follower(self.settings)
 
     @property
     def last_step(self) -> SE2:
         """Motion of the base between the last two scans, in its own frame."""
-        return self._predictor.last_step
+        return SE2(*self._motion.step)
 
     def process(
         self,
@@ -72,58 +84,95 @@ class LocalSlam:
     ) -> Tracked:
         """Predict, register, recover and, on a keyframe, insert."""
         stretch = self._cadence.observe(stamp_ns)
+        odometry = told(pose_odom_base)
         if not self.submaps:
             self._begin_submap()
-            self._predictor.observe(SE2.identity(), pose_odom_base, measured=False)
-            return Tracked(
-                self._pose, self._insert(scan_index, clusters, None, False), False, False
-            )
-        prediction = self._predictor.predict(pose_odom_base, self._cadence.elapsed_s)
+            self._motion = self._moved((0.0, 0.0, 0.0), odometry, None)
+            keyframe = self._insert(scan_index, clusters, None, False)
+            return Tracked(self._pose, keyframe, False, False)
         blind = stretch if pose_odom_base is None else 1.0
-        older = self.older
-        result = match_scan(
-            older,
-            clusters,
-            older.to_submap(self._pose),
-            prediction,
-            blind=blind,
-            explained=self._explained,
-            sigma_m=self.sigma_m,
-            settings=self.settings,
-        )
-        told = result.points >= FEWEST_POINTS
-        lost = told and result.inlier_ratio < self.settings.recovery.lost_below
-        if told and not lost:
-            pose = older.pose_local @ SE2.from_array(result.pose)
+        followed = self._follow(clusters, odometry, blind)
+        if followed.plain:
+            match, due, lost = followed.match, followed.due, False
+            self._pose, self._motion = followed.pose_local, followed.motion
+            self._lost_scans, self._afresh = 0, False
         else:
-            pose = self._pose @ prediction.step
-        self._lost_scans = self._lost_scans + 1 if lost else 0
-        if result.degenerate or lost or not told:
-            self._coasted_m += prediction.drift_m
-        if lost or not told:
-            self._coasted_rad += prediction.drift_rad
-        measured = told and not lost and not result.degenerate
-        step = pose.relative_to(self._pose)
-        self._predictor.observe(
-            step, pose_odom_base, measured=measured, information=result.information
-        )
-        self._pose, self._explained = pose, result.inlier_ratio
-        self._afresh = self._afresh and (lost or not told)
-        moved = pose.relative_to(self.keyframes[-1].pose_local)
-        due = is_keyframe(moved, self.settings.keyframes, self.settings.ladder[-1])
-        self._overlap = max(self._overlap, result.inlier_ratio)
-        due = due or result.inlier_ratio < self.settings.keyframes.overlap * self._overlap
+            match, due, lost = self._find(clusters, odometry, blind, followed)
+        seen = lost or match.points >= FEWEST_POINTS
+        self._explained = match.inlier_ratio
+        self._overlap = max(self._overlap, match.inlier_ratio)
+        due = due or match.inlier_ratio < self.settings.keyframes.overlap * self._overlap
         keyframe = None
-        if lost and self._afresh and prediction.by_odometry:
+        if lost and self._afresh and followed.prediction.by_odometry:
             # new ground would hold as little of such scans as this does: they are too sparse
             keyframe = self._insert(scan_index, clusters, None, False) if due else None
         elif self._lost_scans >= self.settings.recovery.patience:
             self._begin_anew()
             keyframe = self._insert(scan_index, clusters, None, True)
             self._lost_scans = 0
-        elif not lost and told and due:
-            keyframe = self._insert(scan_index, clusters, result, False)
-        return Tracked(pose, keyframe, lost, result.degenerate > 0)
+        elif seen and not lost and due:
+            keyframe = self._insert(scan_index, clusters, match, False)
+        return Tracked(self._pose, keyframe, lost, match.degenerate > 0)
+
+    def _follow(self, clusters: Sequence[Clusters], odometry: Pose, blind: float) -> Followed:
+        """Expect the scan where the motion leads, and look on the finest level alone."""
+        recovery, older = self.settings.recovery, self.older
+        enough = math.inf
+        if blind <= recovery.gap and len(clusters[-1].points) >= FEWEST_POINTS:
+            enough = max(share_enough(self._explained, self.settings), recovery.lost_below)
+        return self._follower.follow(
+            older.levels[-1],
+            clusters[-1],
+            self._motion,
+            odometry,
+            self._cadence.elapsed_s,
+            origin=older.pose_local,
+            last=self._pose,
+            last_keyframe=self.keyframes[-1].pose_local,
+            enough=enough,
+            sigma_m=self.sigma_m,
+        )
+
+    def _find(
+        self, clusters: Sequence[Clusters], odometry: Pose, blind: float, followed: Followed
+    ) -> tuple[RegistrationResult, bool, bool]:
+        """Match a scan that does not lie as expected; whether a keyframe is due, whether lost."""
+        older, prediction = self.older, followed.prediction
+        match = match_scan(
+            older,
+            clusters,
+            older.to_submap(self._pose),
+            prediction,
+            blind=blind,
+            explained=self._explained,
+            finest=followed.match,
+            sigma_m=self.sigma_m,
+            settings=self.settings,
+        )
+        seen = match.points >= FEWEST_POINTS
+        lost = seen and match.inlier_ratio < self.settings.recovery.lost_below
+        if seen and not lost:
+            pose = older.pose_local @ SE2.from_array(match.pose)
+        else:
+            pose = self._pose @ SE2(*prediction.step)
+        self._lost_scans = self._lost_scans + 1 if lost else 0
+        if match.degenerate or lost or not seen:
+            self._coasted_m += prediction.drift_m
+        if lost or not seen:
+            self._coasted_rad += prediction.drift_rad
+        measured = seen and not lost and not match.degenerate
+        step = pose.relative_to(self._pose)
+        self._motion = self._moved(step, odometry, match.information if measured else None)
+        self._pose = pose
+        self._afresh = self._afresh and (lost or not seen)
+        moved = pose.relative_to(self.keyframes[-1].pose_local)
+        return match, is_keyframe(moved, self._follower.keyframe_rule), lost
+
+    def _moved(self, step: Pose, odometry: Pose, information: Points | None) -> Motion:
+        """The motion after a step, and the information of the match that measured it."""
+        vague_m = 0.0 if information is None else worst_sigma_m(information)
+        rule, measured = self._follower.motion_rule, information is not None
+        return moved_on(self._motion, tuple(step), odometry, measured, vague_m, rule)
 
     @property
     def older(self) -> Submap:

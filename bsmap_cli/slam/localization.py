@@ -28,7 +28,15 @@ from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
-from bsmap_cli.slam.prediction import Cadence, Predictor
+from bsmap_cli.slam.prediction import (
+    Cadence,
+    motion_rule,
+    moved_on,
+    predict,
+    told,
+    unknown_motion,
+    worst_sigma_m,
+)
 from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.uncertainty import isotropic_information
@@ -73,12 +81,14 @@ class Localizer:
         self._pose = SE2.identity()
         self._usual_ratio = 1.0
         self._cadence = Cadence()
-        self._predictor = Predictor(self.settings.prediction, self.settings.ladder[-1])
+        unit = self.settings.ladder[-1]
+        self._motion = unknown_motion(self.settings.prediction, unit)
+        self._motion_rule = motion_rule(self.settings.prediction, unit)
         self._begin_seeking()
 
     def process(self, scan: Scan) -> None:
         """Find or follow the robot by one more scan."""
-        step = self._local.last_step if self._local else self._predictor.last_step
+        step = self._local.last_step if self._local else SE2(*self._motion.step)
         clusters = self._front.clusters(scan, step)
         self._stamps_ns.append(scan.stamp_ns)
         if self._local is None:
@@ -99,7 +109,8 @@ class Localizer:
     def _follow(self, scan: Scan, clusters: Sequence[Clusters]) -> None:
         """Track against the map; where that fails for some scans, seek again."""
         stretch = self._cadence.observe(scan.stamp_ns)
-        prediction = self._predictor.predict(scan.pose_odom_base, self._cadence.elapsed_s)
+        odometry = told(scan.pose_odom_base)
+        prediction = predict(self._motion, odometry, self._cadence.elapsed_s, self._motion_rule)
         result = match_scan(
             self._map,
             clusters,
@@ -111,16 +122,17 @@ class Localizer:
             sigma_m=self._front.sigma_m,
             settings=self._wary(),
         )
-        told = result.points >= FEWEST_POINTS
-        pose, found = self._pose @ prediction.step, SE2.from_array(result.pose)
-        lost = told and not self._credible(result, pose.inverse() @ found)
-        if told and not lost:
+        seen = result.points >= FEWEST_POINTS
+        pose, found = self._pose @ SE2(*prediction.step), SE2.from_array(result.pose)
+        lost = seen and not self._credible(result, pose.inverse() @ found)
+        if seen and not lost:
             pose = found
             self._usual_ratio += MEMORY * (result.inlier_ratio - self._usual_ratio)
-        measured = told and not lost and not result.degenerate
+        measured = seen and not lost and not result.degenerate
         step = self._pose.inverse() @ pose
-        self._predictor.observe(
-            step, scan.pose_odom_base, measured=measured, information=result.information
+        vague_m = worst_sigma_m(result.information) if measured else 0.0
+        self._motion = moved_on(
+            self._motion, tuple(step), odometry, measured, vague_m, self._motion_rule
         )
         self._pose = pose
         self._poses.extend(pose.as_array())
@@ -178,7 +190,10 @@ class Localizer:
         pose = self._find(local, tracked.pose_local)
         if pose is not None:
             self._settle(pose, tracked.pose_local)
-            self._predictor.observe(local.last_step, scan.pose_odom_base, measured=False)
+            odometry = told(scan.pose_odom_base)
+            self._motion = moved_on(
+                self._motion, tuple(local.last_step), odometry, False, 0.0, self._motion_rule
+            )
 
     def _find(self, local: LocalSlam, pose_local: SE2) -> SE2 | None:
         """The base in the map, if one place alone fits all that was seen of late."""

@@ -23,6 +23,15 @@ ASTRAY_RAD = 0.05  # angles searched where only the way along a corridor is in d
 FEWEST_POINTS = 10  # a scan with fewer says nothing about being lost
 
 
+def share_enough(explained: float, settings: SlamSettings) -> float:
+    """Share of a scan's points that must lie on the finest level to leave it at that.
+
+    explained : share of the last scan's. Of new ground less lies on the map, from any pose: what
+    the last scan had on it is the measure.
+    """
+    return max(settings.registration.shortcut * explained, settings.recovery.search_below)
+
+
 def match_scan(
     submap: Submap,
     clusters: Sequence[Clusters],
@@ -32,6 +41,7 @@ def match_scan(
     blind: float,
     explained: float,
     growing: bool = True,
+    finest: RegistrationResult | None = None,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
@@ -41,24 +51,24 @@ def match_scan(
     anywhere near, and even a fair match may be of another place.
     explained : share of the last scan's points that lay on the map.
     growing : the map ends where the robot has been, and not where the walls do.
+    finest : the match on the finest level, where it has been made.
 
     A corridor holds its few features out of reach as soon as the robot starts, stops or turns
     otherwise than predicted: what is left then looks bare, and the prediction is kept. Where
     points find no wall while one direction is unobserved and no wheels speak, a search looks
     along the corridor; only what shows the way in all directions is believed.
     """
-    predicted = (last @ prediction.step).as_array()
+    predicted = (last @ SE2(*prediction.step)).as_array()
     information = prediction.information()
     recovery = settings.recovery
-    # of new ground less lies on the map, from any pose: what the last scan had on it is the measure
-    enough = max(settings.registration.shortcut * explained, recovery.search_below)
     result = track_down(
         submap.levels,
         clusters,
         predicted,
         predicted,
         information,
-        enough=enough,
+        enough=share_enough(explained, settings),
+        finest=finest,
         sigma_m=sigma_m,
         settings=settings,
     )
@@ -75,7 +85,7 @@ def match_scan(
     if not prediction.by_odometry and (gap or astray):
         believed = np.diag([(0.5 * reach_m) ** -2.0] * 2 + [0.0])
     reach_rad = math.radians(min(180.0, recovery.reach_deg * wider))
-    way = math.hypot(prediction.step.x, prediction.step.y)
+    way = math.hypot(*prediction.step[:2])
     guesses = [(predicted, reach_m + 0.5 * way), (last.as_array(), reach_m + way)]
     if fair and not gap:  # the walls that are seen hold the heading
         guesses, reach_rad = guesses[:1], ASTRAY_RAD

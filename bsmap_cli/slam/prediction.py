@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bsmap_cli.geometry.compiled import inlined
+from bsmap_cli.geometry.compiled_poses import Pose, relative
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.settings import setting
 
@@ -17,6 +20,7 @@ LONGEST_S = 0.5  # no robot gathers speed for longer
 FOLLOWING = 0.6  # of a match's deviation is in the step to it: two in a row err alike
 ODOMETRY_DRIFT = 0.1  # of the way and of the turn: what raw odometry slips at its worst
 ODOMETRY_TURN = 0.001  # and turns on a straight way [rad per finest knot step]
+UNTOLD = (math.nan, math.nan, math.nan)  # where the log has no odometry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +55,39 @@ class PredictionSettings:
     )
 
 
+class Motion(NamedTuple):
+    """How the base moved of late. Every scan makes a new one.
+
+    step : (x, y [m], theta [rad]) from the scan before to the last one, in the frame of the base.
+    cruise_x_m, cruise_y_m : what a step usually is; steps : how many there have been.
+    spread_m, spread_rad : root mean square of how far steps differ from those before them.
+    vague_m : what the match that tells of the last step leaves open.
+    odometry : pose of the base in its frame at the last scan, or `UNTOLD`.
+    """
+
+    step: Pose
+    cruise_x_m: float
+    cruise_y_m: float
+    steps: float
+    spread_m: float
+    spread_rad: float
+    vague_m: float
+    odometry: Pose
+
+
+class MotionRule(NamedTuple):
+    """`PredictionSettings` in metres, radians and seconds, for compiled code."""
+
+    odometry_m: float
+    odometry_rad: float
+    unit_m: float
+    margin: float
+    floor_m: float
+    floor_rad: float
+    acceleration_m_s2: float
+    acceleration_rad_s2: float
+
+
 class Prediction(NamedTuple):
     """`step` is the motion in the body frame since the last scan.
 
@@ -59,7 +96,7 @@ class Prediction(NamedTuple):
     by_odometry : wheels say so, and not the motion so far.
     """
 
-    step: SE2
+    step: Pose
     sigma_m: float
     sigma_rad: float
     drift_m: float
@@ -74,85 +111,102 @@ class Prediction(NamedTuple):
         return information
 
 
-class Predictor:
-    """Odometry increments where the log has them, else constant velocity."""
-
-    def __init__(self, settings: PredictionSettings, finest_step_m: float) -> None:
-        self.settings = settings
-        self.unit_m = finest_step_m
-        self._odometry: SE2 | None = None
-        self.last_step = SE2.identity()
-        self._cruise_m = (0.0, 0.0)
-        self._told: Points | None = None
-        self._steps = -1  # the first pose is no step
-        self._spread_m = settings.motion_sigma * finest_step_m / settings.motion_margin
-        self._spread_rad = math.radians(settings.motion_sigma_deg) / settings.motion_margin
-
-    def predict(self, pose_odom_base: SE2 | None, elapsed_s: float) -> Prediction:
-        """The step from the last scan to this one; `observe` must follow."""
-        settings = self.settings
-        if pose_odom_base is not None and self._odometry is not None:
-            step = pose_odom_base.relative_to(self._odometry)
-            way = math.hypot(step.x, step.y)
-            return Prediction(
-                step,
-                settings.odometry_sigma * self.unit_m + way,
-                math.radians(settings.odometry_sigma_deg) + abs(step.theta),
-                ODOMETRY_DRIFT * way,
-                ODOMETRY_DRIFT * abs(step.theta) + ODOMETRY_TURN * way / self.unit_m,
-                True,
-            )
-        square_s2 = min(elapsed_s, LONGEST_S) ** 2
-        started_rad = math.radians(settings.acceleration_deg_s2) * square_s2
-        started_m = settings.acceleration_m_s2 * square_s2
-        vague_m = 0.0 if self._told is None else FOLLOWING * worst_sigma_m(self._told)
-        sigma_m = max(settings.motion_margin * self._spread_m, math.hypot(started_m, vague_m))
-        sigma_rad = max(settings.motion_margin * self._spread_rad, started_rad)
-        return Prediction(self.last_step, sigma_m, sigma_rad, sigma_m, sigma_rad, False)
-
-    def observe(
-        self,
-        step: SE2,
-        pose_odom_base: SE2 | None,
-        *,
-        measured: bool,
-        information: Points | None = None,
-    ) -> None:
-        """Tell what the step turned out to be, and whether the walls said so in all directions.
-
-        information : (3, 3) of the match that says so. A velocity taken from such poses is hardly
-        better than they in the direction that the walls tell least of, and a robot that brakes
-        must not be carried past the little that holds it.
-        """
-        self._told = information if measured else None
-        if measured:
-            surprise = step.relative_to(self.last_step)
-            settings = self.settings
-            floor_m = settings.motion_floor * self.unit_m / settings.motion_margin
-            floor_rad = 0.1 * math.radians(settings.motion_sigma_deg) / settings.motion_margin
-            squared = 0.5 * (surprise.x**2 + surprise.y**2)
-            self._spread_m = max(floor_m, _faded(self._spread_m, squared))
-            self._spread_rad = max(floor_rad, _faded(self._spread_rad, surprise.theta**2))
-            self.last_step = step
-        self._steps += 1
-        share = max(CRUISE, 1.0 / max(self._steps, 1))  # a log may begin on the way
-        x, y = self._cruise_m
-        self._cruise_m = (x + share * (step.x - x), y + share * (step.y - y))
-        if not measured:  # what no wall says must not grow out of the noise of one step
-            self.last_step = SE2(*self._cruise_m, step.theta)
-        self._odometry = pose_odom_base
+def motion_rule(settings: PredictionSettings, finest_step_m: float) -> MotionRule:
+    """The settings for a map of this knot step."""
+    return MotionRule(
+        odometry_m=settings.odometry_sigma * finest_step_m,
+        odometry_rad=math.radians(settings.odometry_sigma_deg),
+        unit_m=finest_step_m,
+        margin=settings.motion_margin,
+        floor_m=settings.motion_floor * finest_step_m / settings.motion_margin,
+        floor_rad=0.1 * math.radians(settings.motion_sigma_deg) / settings.motion_margin,
+        acceleration_m_s2=settings.acceleration_m_s2,
+        acceleration_rad_s2=math.radians(settings.acceleration_deg_s2),
+    )
 
 
+def unknown_motion(settings: PredictionSettings, finest_step_m: float) -> Motion:
+    """Before the first scan."""
+    return Motion(
+        step=(0.0, 0.0, 0.0),
+        cruise_x_m=0.0,
+        cruise_y_m=0.0,
+        steps=-1.0,  # the first pose is no step
+        spread_m=settings.motion_sigma * finest_step_m / settings.motion_margin,
+        spread_rad=math.radians(settings.motion_sigma_deg) / settings.motion_margin,
+        vague_m=0.0,
+        odometry=UNTOLD,
+    )
+
+
+def told(pose_odom_base: SE2 | None) -> Pose:
+    """Odometry of a scan as compiled code knows it."""
+    return UNTOLD if pose_odom_base is None else tuple(pose_odom_base)
+
+
+@inlined
+def predict(motion: Motion, odometry: Pose, elapsed_s: float, rule: MotionRule) -> Prediction:
+    """The step from the last scan to this one: odometry where the log has it, else the last step.
+
+    odometry : `told` by this scan; elapsed_s : since the last one.
+    """
+    if not (math.isnan(odometry[0]) or math.isnan(motion.odometry[0])):
+        step = relative(odometry, motion.odometry)
+        way = magnitude(step[0], step[1])
+        turn = abs(step[2])
+        return Prediction(
+            step,
+            rule.odometry_m + way,
+            rule.odometry_rad + turn,
+            ODOMETRY_DRIFT * way,
+            ODOMETRY_DRIFT * turn + ODOMETRY_TURN * way / rule.unit_m,
+            True,
+        )
+    within_s = min(elapsed_s, LONGEST_S)
+    started_m = rule.acceleration_m_s2 * within_s * within_s
+    started_rad = rule.acceleration_rad_s2 * within_s * within_s
+    sigma_m = max(rule.margin * motion.spread_m, magnitude(started_m, motion.vague_m))
+    sigma_rad = max(rule.margin * motion.spread_rad, started_rad)
+    return Prediction(motion.step, sigma_m, sigma_rad, sigma_m, sigma_rad, False)
+
+
+@inlined
+def moved_on(
+    motion: Motion, step: Pose, odometry: Pose, measured: bool, vague_m: float, rule: MotionRule
+) -> Motion:
+    """The motion once it is known what the step turned out to be.
+
+    measured : the walls said so in all directions. vague_m : `worst_sigma_m` of the match that
+    says so. A velocity taken from such poses is hardly better than they in the direction that the
+    walls tell least of, and a robot that brakes must not be carried past the little that holds it.
+    """
+    steps = motion.steps + 1.0
+    share = max(CRUISE, 1.0 / max(steps, 1.0))  # a log may begin on the way
+    cruise_x = motion.cruise_x_m + share * (step[0] - motion.cruise_x_m)
+    cruise_y = motion.cruise_y_m + share * (step[1] - motion.cruise_y_m)
+    if not measured:  # what no wall says must not grow out of the noise of one step
+        cruised = (cruise_x, cruise_y, step[2])
+        spread_m, spread_rad = motion.spread_m, motion.spread_rad
+        return Motion(cruised, cruise_x, cruise_y, steps, spread_m, spread_rad, 0.0, odometry)
+    x, y, turn = relative(step, motion.step)
+    spread_m = max(rule.floor_m, _faded(motion.spread_m, 0.5 * (x * x + y * y)))
+    spread_rad = max(rule.floor_rad, _faded(motion.spread_rad, turn * turn))
+    vague = FOLLOWING * vague_m
+    return Motion(step, cruise_x, cruise_y, steps, spread_m, spread_rad, vague, odometry)
+
+
+@inlined
 def worst_sigma_m(information: Points) -> float:
     """Deviation [m] of a position in the direction that (3, 3) information tells least of."""
-    (xx, xy, _), (_, yy, _), _ = information.tolist()
-    least = 0.5 * (xx + yy) - math.hypot(0.5 * (xx - yy), xy)
+    xx, xy, yy = information[0, 0], information[0, 1], information[1, 1]
+    least = 0.5 * (xx + yy) - magnitude(0.5 * (xx - yy), xy)
     return 1.0 / math.sqrt(max(least, 1e-12))
 
 
+@inlined
 def _faded(spread: float, squared: float) -> float:
     """Root mean square with a memory of about twenty scans."""
-    return math.sqrt((1.0 - MEMORY) * spread**2 + MEMORY * squared)
+    return math.sqrt((1.0 - MEMORY) * spread * spread + MEMORY * squared)
 
 
 class Cadence:

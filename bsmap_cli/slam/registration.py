@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled import kernel
+from bsmap_cli.geometry.compiled import kernel, part
 from bsmap_cli.geometry.kernels import magnitude, solve3
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
@@ -91,9 +91,32 @@ class RegistrationResult(NamedTuple):
     points: int
 
 
-@kernel
-def _register(
-    arrays: tuple[Any, ...],
+class Gates(NamedTuple):
+    """`RegistrationSettings` in metres, for one level and one range noise, for compiled code."""
+
+    gate_m: float
+    kernel_m: float
+    inlier_m: float
+    iterations: int
+    degenerate: float
+    certain: float
+
+
+def gates_of(settings: RegistrationSettings, knot_step_m: float, sigma_m: float) -> Gates:
+    """For scans of such a range noise on a level of such a knot step."""
+    return Gates(
+        gate_m=settings.gate * knot_step_m,
+        kernel_m=max(settings.kernel * knot_step_m, 2.0 * sigma_m),
+        inlier_m=max(settings.inlier * knot_step_m, 3.0 * sigma_m),
+        iterations=settings.iterations,
+        degenerate=settings.degenerate,
+        certain=settings.certain,
+    )
+
+
+@part
+def gauss_newton(
+    level: LevelArrays,
     matrix: Points,
     knot_step_m: float,
     points: Points,
@@ -103,20 +126,11 @@ def _register(
     pose: Vector,
     prior_pose: Vector,
     prior_information: Points,
-    gate_m: float,
-    kernel_m: float,
-    inlier_m: float,
-    iterations: int,
-    degenerate: float,
-    certain: float,
+    gates: Gates,
     hessian: Points,
     tally: Vector,
 ) -> tuple[int, int]:
-    """Gauss-Newton on `pose` in place; steps taken and degenerate directions.
-
-    arrays : of the level; what is no more than a tuple is handed over three times as fast.
-    """
-    level = LevelArrays(*arrays)
+    """Gauss-Newton on `pose` in place; steps taken and degenerate directions."""
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
     for j in range(len(points)):
         variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
@@ -126,7 +140,7 @@ def _register(
     start = pose.copy()
     found = 0
     steps = 0
-    for _ in range(iterations):
+    for _ in range(gates.iterations):
         accumulate(
             level,
             matrix,
@@ -135,9 +149,9 @@ def _register(
             tangents,
             variances,
             pose,
-            gate_m,
-            kernel_m,
-            inlier_m,
+            gates.gate_m,
+            gates.kernel_m,
+            gates.inlier_m,
             rows,
             places,
             hessian,
@@ -159,14 +173,52 @@ def _register(
         lever = math.sqrt(tally[2] / max(tally[3], 1e-300))
         for i in range(3):
             wanted[i] = start[i] - pose[i]
-        least = degenerate * tally[4]
-        found = keep_unobserved(hessian, jacobian, lever, least, certain * least, wanted, delta)
+        least = gates.degenerate * tally[4]
+        certain = gates.certain * least
+        found = keep_unobserved(hessian, jacobian, lever, least, certain, wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
         moved = magnitude(delta[0], delta[1]) + lever * abs(delta[2])
         if moved < STILL * knot_step_m:
             break
     return steps, found
+
+
+@kernel
+def _register(
+    arrays: tuple[Any, ...],
+    matrix: Points,
+    knot_step_m: float,
+    points: Points,
+    tangents: Points,
+    counts: Vector,
+    sigma_m: float,
+    pose: Vector,
+    prior_pose: Vector,
+    prior_information: Points,
+    gates: tuple[Any, ...],
+    hessian: Points,
+    tally: Vector,
+) -> tuple[int, int]:
+    """`gauss_newton` for Python, with level and gates as plain tuples.
+
+    What is no more than a tuple is handed over three times as fast.
+    """
+    return gauss_newton(
+        LevelArrays(*arrays),
+        matrix,
+        knot_step_m,
+        points,
+        tangents,
+        counts,
+        sigma_m,
+        pose,
+        prior_pose,
+        prior_information,
+        Gates(*gates),
+        hessian,
+        tally,
+    )
 
 
 def register(
@@ -190,6 +242,9 @@ def register(
     """
     step = curve_map.knot_step_m
     pose, hessian, tally = start_pose.copy(), np.empty((3, 3)), np.empty(5)
+    gates = gates_of(settings, step, sigma_m)
+    if iterations:
+        gates = gates._replace(iterations=iterations)
     steps, degenerate = _register(
         tuple(curve_map.arrays),
         curve_map.matrix,
@@ -201,12 +256,7 @@ def register(
         pose,
         prior_pose,
         prior_information,
-        settings.gate * step,
-        max(settings.kernel * step, 2.0 * sigma_m),
-        max(settings.inlier * step, 3.0 * sigma_m),
-        iterations or settings.iterations,
-        settings.degenerate,
-        settings.certain,
+        tuple(gates),
         hessian,
         tally,
     )
