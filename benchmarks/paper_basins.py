@@ -12,7 +12,7 @@ import numpy as np
 from bsmap_cli.config import Settings, load_settings
 from bsmap_cli.geometry.se2 import SE2, Vector, wrap_angle
 from bsmap_cli.mapping.mapper import Mapper
-from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.scan_levels import Segmenter
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.simulator.simulation import simulate
 from bsmap_cli.slam.ladder import track_down
@@ -76,13 +76,14 @@ def _mapped(scene: str, lidar: str) -> tuple[Mapper, list[tuple[Sequence[Cluster
     simulation = simulate(scene, lidar=lidar, noise_m=NOISE_M, odometry=False)
     settings = load_settings("default")
     mapper, asked = Mapper(settings), []
+    segmenter = Segmenter(settings)
     every = max(4, len(simulation) // MAPPED)
     other = max(4, len(simulation) // ASKED)
     for k, (scan, pose) in enumerate(zip(simulation.scans(), simulation.truth.poses, strict=True)):
         if k % every == 0:
             mapper.insert(scan, SE2.from_array(pose))
         elif k % other == 1:
-            asked.append((scan_levels(scan, settings, NOISE_M), pose))
+            asked.append((segmenter.levels(scan, NOISE_M), pose))
     return mapper, asked
 
 

@@ -13,7 +13,7 @@ from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.insertion import insert_clusters
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.scan_levels import Segmenter
 from bsmap_cli.mapping.trimming import remove_guessed
 from bsmap_cli.sensor.range_noise import RangeNoise
 from bsmap_cli.sensor.scan import Scan
@@ -29,6 +29,7 @@ class Mapper:
         self.settings = settings.without_faint()  # the poses are known: nothing to guide
         self.levels = [CurveMap(step, settings.degree) for step in settings.ladder]
         self.noise = RangeNoise(settings.sensor, settings.ladder[-1])
+        self._segmenter = Segmenter(self.settings)
         self._views: list[View] = []
         self._last_view: SE2 | None = None
 
@@ -36,7 +37,7 @@ class Mapper:
         """Algorithm 1: one scan enters the map at its pose."""
         settings, pose = self.settings, pose_map_base.as_array()
         self.noise.observe(scan)
-        clusters = scan_levels(scan, settings, self.noise.sigma_m)
+        clusters = self._segmenter.levels(scan, self.noise.sigma_m)
         for level, seen in zip(self.levels, clusters, strict=True):
             insert_clusters(level, seen, pose, settings)
         self._look(scan, pose_map_base)

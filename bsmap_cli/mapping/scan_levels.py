@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.fitting import FittingSettings
 from bsmap_cli.mapping.levels import Levels
-from bsmap_cli.mapping.segmentation import Clusters, find_clusters
+from bsmap_cli.mapping.segmentation import (
+    Clusters,
+    SegmentationRule,
+    find_clusters,
+    segmentation_rule,
+)
 from bsmap_cli.sensor.gate import STANDING, fan_of
 from bsmap_cli.sensor.scan import Scan
 
@@ -40,30 +45,50 @@ class ScanLevels(Levels[Clusters]):
         return level
 
 
-def scan_levels(
-    scan: Scan,
-    settings: MappingSettings,
-    sigma_m: float,
-    twist_body: Vector = STANDING,
-) -> Sequence[Clusters]:
-    """Segment at the finest knot step, eq. (3), and widen the bins for the coarser ones.
+class Segmenter:
+    """Segments scans at the finest knot step, eq. (3), and widens the bins for the coarser ones.
 
     With `segmentation.each_level` every knot step is segmented on its own, as in the paper.
-    twist_body : as in `find_clusters`.
     """
-    ladder, thinning = settings.ladder, settings.fitting.thinning
-    fan = fan_of(scan, settings.sensor, ladder[-1])
-    each = settings.segmentation.each_level
-    found = [
-        find_clusters(
-            scan,
-            fan,
-            settings.segmentation,
-            knot_step_m=step,
-            bin_m=thinning * step,
-            sigma_m=sigma_m,
-            twist_body=twist_body,
+
+    def __init__(self, settings: MappingSettings) -> None:
+        self._settings = settings
+        self._lidar: tuple[object, ...] = ()
+        self._rules: list[SegmentationRule] = []
+
+    def levels(
+        self, scan: Scan, sigma_m: float, twist_body: Vector = STANDING
+    ) -> Sequence[Clusters]:
+        """One scan as the levels of the ladder see it; `twist_body` as in `find_clusters`."""
+        settings = self._settings
+        lidar = (
+            sigma_m,
+            scan.angle_min_rad,
+            scan.angle_increment_rad,
+            len(scan.ranges_m),
+            scan.range_min_m,
+            scan.range_max_m,
+            scan.time_increment_s,
+            scan.pose_base_laser,
         )
-        for step in (ladder if each else ladder[-1:])
-    ]
-    return found if each else ScanLevels(found[0], ladder, settings.fitting, sigma_m)
+        if lidar != self._lidar:  # seldom
+            self._lidar, self._rules = lidar, self._rules_for(scan, sigma_m)
+        if settings.segmentation.each_level:
+            return [find_clusters(scan.ranges_m, rule, twist_body) for rule in self._rules]
+        finest = find_clusters(scan.ranges_m, self._rules[0], twist_body)
+        return ScanLevels(finest, settings.ladder, settings.fitting, sigma_m)
+
+    def _rules_for(self, scan: Scan, sigma_m: float) -> list[SegmentationRule]:
+        settings = self._settings
+        ladder = settings.ladder
+        fan = fan_of(scan, settings.sensor, ladder[-1])
+        return [
+            segmentation_rule(
+                fan,
+                settings.segmentation,
+                knot_step_m=step,
+                bin_m=settings.fitting.thinning * step,
+                sigma_m=sigma_m,
+            )
+            for step in (ladder if settings.segmentation.each_level else ladder[-1:])
+        ]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.continuity import BEAM_GAPS, GapRule, cut_surfaces
 from bsmap_cli.mapping.least_surface import LeastSurface
 from bsmap_cli.sensor.gate import STANDING, Fan, gather
-from bsmap_cli.sensor.scan import Ranges, Scan
+from bsmap_cli.sensor.scan import Ranges
 from bsmap_cli.settings import setting
 
 
@@ -190,47 +189,55 @@ def _see(
     return n, clusters
 
 
-@lru_cache(maxsize=64)
-def _rules(
-    settings: SegmentationSettings, knot_step_m: float, sigma_m: float, beam_step_rad: float
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Gap rule and least surface: the same from scan to scan until the noise is known better."""
-    rule = GapRule(
+class SegmentationRule(NamedTuple):
+    """All that tells how a scan is cut but the scan: made once for a lidar and its noise.
+
+    fan, gap_rule, least : `Fan`, `GapRule` and `LeastSurface` as plain tuples.
+    """
+
+    fan: tuple[Any, ...]
+    gap_rule: tuple[Any, ...]
+    least: tuple[Any, ...]
+    bin_m: float
+    reach_m: float
+
+
+def segmentation_rule(
+    fan: Fan, settings: SegmentationSettings, *, knot_step_m: float, bin_m: float, sigma_m: float
+) -> SegmentationRule:
+    """For scans of a fan whose ranges err by `sigma_m`, thinned into bins of `bin_m`."""
+    gap_rule = GapRule(
         max_gap_m=settings.max_gap * knot_step_m,
         rel_gap=settings.rel_gap,
-        beam_gap_rad=BEAM_GAPS * beam_step_rad if settings.beam_gap else 0.0,
+        beam_gap_rad=BEAM_GAPS * fan.beam_step_rad if settings.beam_gap else 0.0,
         sigma_m=sigma_m if settings.beam_gap else 0.0,
         fewest=settings.min_points,
     )
-    return tuple(rule), tuple(settings.least(knot_step_m))
+    least = settings.least(knot_step_m)
+    reach_m = _reach_m(knot_step_m, sigma_m)
+    return SegmentationRule(tuple(fan), tuple(gap_rule), tuple(least), bin_m, reach_m)
 
 
 def find_clusters(
-    scan: Scan,
-    fan: Fan,
-    settings: SegmentationSettings,
-    *,
-    knot_step_m: float,
-    bin_m: float,
-    sigma_m: float,
-    twist_body: Vector = STANDING,
+    ranges_m: Ranges, rule: SegmentationRule, twist_body: Vector = STANDING
 ) -> Clusters:
     """Cut the returns where the surface ends, eq. (3), and thin each cluster into bins.
 
-    twist_body : (3,) vx, vy [m/s], omega [rad/s] of the base, to undo the motion of the sweep.
+    ranges_m : (n,) of all beams of the rule's fan. twist_body : (3,) vx, vy [m/s], omega [rad/s]
+    of the base, to undo the motion of the sweep.
     """
-    beams = len(scan.ranges_m)
-    rule, least = _rules(settings, knot_step_m, sigma_m, fan.beam_step_rad)
+    beams = len(ranges_m)
     points, tangents, counts = np.empty((beams, 2)), np.empty((beams, 2)), np.empty(beams)
     starts = np.empty(beams + 1, np.int64)
+    fan, gap_rule, least, bin_m, reach_m = rule
     n, clusters = _see(
-        scan.ranges_m,
-        tuple(fan),
+        ranges_m,
+        fan,
         twist_body,
-        rule,
+        gap_rule,
         least,
         bin_m,
-        _reach_m(knot_step_m, sigma_m),
+        reach_m,
         points,
         tangents,
         counts,

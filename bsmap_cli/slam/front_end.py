@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bsmap_cli.geometry.se2 import SE2, Vector
-from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.scan_levels import Segmenter
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.gate import STANDING
 from bsmap_cli.sensor.range_noise import RangeNoise
@@ -25,7 +25,7 @@ class FrontEnd:
     """
 
     def __init__(self, settings: SlamSettings) -> None:
-        self._settings = settings
+        self._segmenter = Segmenter(settings)
         self._noise = RangeNoise(settings.sensor, settings.ladder[-1])
         self.twist = STANDING
         self._last_stamp_ns: int | None = None
@@ -40,7 +40,7 @@ class FrontEnd:
         self._noise.observe(scan)
         self.twist = self._twist(scan, last_step)
         self._last_stamp_ns = scan.stamp_ns
-        return scan_levels(scan, self._settings, self.sigma_m, self.twist)
+        return self._segmenter.levels(scan, self.sigma_m, self.twist)
 
     def _twist(self, scan: Scan, last_step: SE2) -> Vector:
         if self._last_stamp_ns is None:

@@ -11,7 +11,7 @@ from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.centroid_tracking import Tracks, cluster_centroids, track_clusters
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.mapper import Mapper
-from bsmap_cli.mapping.scan_levels import scan_levels
+from bsmap_cli.mapping.scan_levels import Segmenter
 from bsmap_cli.sensor.scan import Scan
 from bsmap_cli.sensor.simulator.simulation import simulate
 from tests.mapping.walls import arc, insert, line, speeds
@@ -101,7 +101,7 @@ def test_each_level_is_segmented_by_its_own_gamma_abs():
         angle_min_rad=0.0,
         angle_increment_rad=0.02,
     )
-    levels = scan_levels(scan, replace(PAPER, ladder=(0.4, 0.1)), 0.01)
+    levels = Segmenter(replace(PAPER, ladder=(0.4, 0.1))).levels(scan, 0.01)
     assert [len(level) for level in levels] == [1, 0]
     assert len(levels[0].points) == 40  # nothing is thinned
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bsmap_cli.config import load_settings
-from bsmap_cli.mapping.segmentation import SegmentationSettings, find_clusters
+from bsmap_cli.mapping.segmentation import SegmentationSettings, find_clusters, segmentation_rule
 from bsmap_cli.sensor.gate import SensorSettings, fan_of
 from bsmap_cli.sensor.scan import Scan
 
@@ -31,7 +31,8 @@ def clusters_of(ranges, rule=DEFAULT, sigma_m=SIGMA):
         range_max_m=20.0,
     )
     fan = fan_of(scan, SensorSettings(), STEP)
-    return find_clusters(scan, fan, rule, knot_step_m=STEP, bin_m=0.0, sigma_m=sigma_m)
+    found = segmentation_rule(fan, rule, knot_step_m=STEP, bin_m=0.0, sigma_m=sigma_m)
+    return find_clusters(scan.ranges_m, found)
 
 
 def room(seed, noise_m=SIGMA):
