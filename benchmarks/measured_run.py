@@ -16,6 +16,7 @@ from typing import Any
 
 import fresh_kernels  # noqa: F401  (before numba)
 
+from bsmap_cli.cli.door import collect_seldom
 from bsmap_cli.config import Settings, load_settings
 from bsmap_cli.exchange.tum import write_tum
 from bsmap_cli.logs.open_log import open_log
@@ -47,6 +48,7 @@ def main() -> None:
     parser.add_argument("--odom", default="auto")
     arguments = parser.parse_args()
     settings = load_settings(overrides=arguments.set)
+    collect_seldom()  # as the command does
     measured(WARM_UP, settings, "auto")
     run, report = measured(arguments.log, settings, arguments.odom)
     if arguments.traj:

@@ -33,10 +33,15 @@ def run(arguments: Sequence[str]) -> int:
     from bsmap_cli.cli.app import build_app
 
     catch_signals()
-    gc.set_threshold(YOUNG_OBJECTS, 50, 50)
+    collect_seldom()
     code = guarded(lambda: build_app(arguments)(list(arguments), "bsmap", standalone_mode=False))
     flushed = guarded(_flush_output)
     return code or flushed
+
+
+def collect_seldom() -> None:
+    """Let Python seldom look for cycles, of which scans and maps make none."""
+    gc.set_threshold(YOUNG_OBJECTS, 50, 50)
 
 
 def guarded(action: Callable[[], Any], talk: Talk | None = None) -> int:

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from bsmap_cli.slam.slam import Slam
 
 
+MOST_AHEAD = 64  # scans that are read at a time
+LONGEST_S = 0.01  # that reading them may take
+
+
 class Progress(Protocol):
     """Who is told how far a run has come."""
 
@@ -65,13 +69,7 @@ class Feed:
     sensor: dict[str, Any] | None = None
 
     def __iter__(self) -> Iterator[Scan]:
-        source = iter(self.reader.scans())
-        while True:
-            began = perf_counter()
-            scan = next(source, None)
-            self.read_s += perf_counter() - began
-            if scan is None:
-                break
+        for scan in self._read():
             if self.sensor is None:
                 self.first_ns, self.sensor = scan.stamp_ns, _sensor(scan)
             self.count += 1
@@ -82,6 +80,31 @@ class Feed:
             raise LogError(
                 "the log holds no usable scan: see `bsmap check`, and --start, --end and --topic"
             )
+
+    def _read(self) -> Iterator[Scan]:
+        """The scans, some of them read ahead: what is done over and over stays in the caches.
+
+        A reader that waits for its log to be written is not waited for, and where it fails, the
+        scans before come first.
+        """
+        source = iter(self.reader.scans())
+        failure: Exception | None = None
+        ended = False
+        while not ended:
+            began = now = perf_counter()
+            ahead: list[Scan] = []
+            try:
+                while len(ahead) < MOST_AHEAD and now - began < LONGEST_S:
+                    ahead.append(next(source))
+                    now = perf_counter()
+            except StopIteration:
+                ended = True
+            except Exception as error:  # told once the scans before it are through
+                ended, failure = True, error
+            self.read_s += perf_counter() - began
+            yield from ahead
+        if failure:
+            raise failure
 
     @property
     def span_s(self) -> float:
