@@ -12,6 +12,12 @@ from bsmap_cli.geometry.compiled import inlined
 Pose = tuple[float, float, float]
 
 
+def as_pose(pose: Pose) -> Pose:
+    """The same, whatever named tuple it is: numba takes each kind for a type of its own."""
+    x, y, theta = pose
+    return x, y, theta
+
+
 @inlined
 def wrapped(angle_rad: float) -> float:
     """The same angle in (-pi, pi]."""

@@ -173,26 +173,29 @@ def gather(
     moving = beam_time != 0.0 and (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0)
     count = 0
     beams = len(ranges)
+    first = 0.0 if beam_time > 0.0 else beam_time * (1 - beams)
+    # the turn of each beam from that of the beam before it: a sine costs as much as all the rest
+    c, s = math.cos(twist[2] * first), math.sin(twist[2] * first)
+    step_c, step_s = math.cos(twist[2] * beam_time), math.sin(twist[2] * beam_time)
     for i in range(beams):
         r = float(ranges[i])
-        if not (fan.used[i] and fan.near_m <= r <= fan.far_m):
-            continue
-        x, y = r * fan.cosines[i], r * fan.sines[i]
-        bx = cos * x - sin * y + fan.laser[0]
-        by = sin * x + cos * y + fan.laser[1]
+        if fan.used[i] and fan.near_m <= r <= fan.far_m:
+            x, y = r * fan.cosines[i], r * fan.sines[i]
+            bx = cos * x - sin * y + fan.laser[0]
+            by = sin * x + cos * y + fan.laser[1]
+            if moving:
+                elapsed = first + beam_time * i
+                bx, by = (
+                    c * bx - s * by + twist[0] * elapsed,
+                    s * bx + c * by + twist[1] * elapsed,
+                )
+            points[count, 0] = bx
+            points[count, 1] = by
+            lengths[count] = r
+            returned[count] = i
+            count += 1
         if moving:
-            elapsed = beam_time * i if beam_time > 0.0 else beam_time * (i - beams + 1)
-            turn = twist[2] * elapsed
-            c, s = math.cos(turn), math.sin(turn)
-            bx, by = (
-                c * bx - s * by + twist[0] * elapsed,
-                s * bx + c * by + twist[1] * elapsed,
-            )
-        points[count, 0] = bx
-        points[count, 1] = by
-        lengths[count] = r
-        returned[count] = i
-        count += 1
+            c, s = c * step_c - s * step_s, s * step_c + c * step_s
     if fan.around and count > 2:
         seam = _behind_widest_gap(points, count)
         for i in range(seam):

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bsmap_cli.geometry.compiled import lean
 from bsmap_cli.geometry.se2 import SE2, Vector
 from bsmap_cli.sensor.gate import NO_RETURN_SHARE, STANDING, SensorSettings, fan_of
-from bsmap_cli.sensor.scan import Scan
+from bsmap_cli.sensor.scan import Ranges, Scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,20 @@ class Sight:
         return float(finite.max(initial=0.0))
 
 
+@lean
+def _tell_ends(
+    ranges: Ranges, used: NDArray[np.bool_], near_m: float, far_m: float, ends: Ranges
+) -> None:
+    """Where each beam ended, as `Sight` tells it."""
+    for i in range(len(ranges)):
+        if not (used[i] and ranges[i] >= near_m):
+            ends[i] = np.nan
+        elif ranges[i] > far_m:
+            ends[i] = np.inf
+        else:
+            ends[i] = ranges[i]
+
+
 def find_sight(
     scan: Scan, settings: SensorSettings, knot_step_m: float, twist_body: Vector = STANDING
 ) -> Sight:
@@ -43,13 +58,10 @@ def find_sight(
     """
     fan = fan_of(scan, settings, knot_step_m)
     beams = len(scan.ranges_m)
-    ranges = scan.ranges_m.astype(np.float32)
+    ranges = np.empty(beams, np.float32)
     most = scan.range_max_m * NO_RETURN_SHARE
-    with np.errstate(invalid="ignore"):
-        beyond = ranges > (most if 0.0 < most < math.inf else fan.far_m)
-        silent = ~(ranges >= fan.near_m) | ~fan.used
-    ranges[beyond] = math.inf
-    ranges[silent] = math.nan
+    far_m = most if 0.0 < most < math.inf else fan.far_m
+    _tell_ends(scan.ranges_m, fan.used, fan.near_m, far_m, ranges)
     laser, step = scan.pose_base_laser, scan.angle_increment_rad
     first = scan.angle_min_rad
     beam_time = fan.beam_time_s

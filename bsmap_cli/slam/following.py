@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.compiled_poses import Pose, composed, relative
+from bsmap_cli.geometry.compiled_poses import Pose, as_pose, composed, relative
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.level_arrays import LevelArrays
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 class Followed(NamedTuple):
     """What came of following a scan on the finest level.
 
-    plain : it lies where it was expected, and in all directions walls say so. Only then pose, motion
-    and due are those after this scan; else they are those before.
-    prediction, match : what was expected, and found; the pose of the match is in the submap's frame.
+    plain : it lies where it was expected, and walls say so in all directions. Only then pose,
+    motion and due are those after this scan; else they are those before.
+    prediction, match : what was expected, and what was found, its pose in the submap's frame.
     due : the base has moved far enough for a keyframe.
     """
 
@@ -156,9 +156,9 @@ class Follower:
             self._rules[1],
             odometry,
             elapsed_s,
-            tuple(origin),
-            tuple(last),
-            tuple(last_keyframe),
+            as_pose(origin),
+            as_pose(last),
+            as_pose(last_keyframe),
             enough,
             pose,
             hessian,

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from bsmap_cli.geometry.se2 import SE2, Vector
+import numpy as np
+
+from bsmap_cli.geometry.compiled_poses import Pose
+from bsmap_cli.geometry.se2 import Vector
 from bsmap_cli.mapping.scan_levels import Segmenter
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.sensor.gate import STANDING
@@ -35,18 +38,18 @@ class FrontEnd:
         """Deviation of the range noise [m]."""
         return self._noise.sigma_m
 
-    def clusters(self, scan: Scan, last_step: SE2) -> Sequence[Clusters]:
+    def clusters(self, scan: Scan, last_step: Pose) -> Sequence[Clusters]:
         """Clusters of one scan, coarse to fine; `last_step` is the motion since the scan before."""
         self._noise.observe(scan)
         self.twist = self._twist(scan, last_step)
         self._last_stamp_ns = scan.stamp_ns
         return self._segmenter.levels(scan, self.sigma_m, self.twist)
 
-    def _twist(self, scan: Scan, last_step: SE2) -> Vector:
+    def _twist(self, scan: Scan, last_step: Pose) -> Vector:
         if self._last_stamp_ns is None:
             return STANDING
         elapsed = 1e-9 * (scan.stamp_ns - self._last_stamp_ns)
         sweep = abs(scan.time_increment_s) * len(scan.ranges_m)
         if not 0.0 < sweep <= 1.5 * elapsed:
             return STANDING
-        return last_step.as_array() / elapsed
+        return np.array(last_step) / elapsed

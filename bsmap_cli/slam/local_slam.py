@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bsmap_cli.geometry.compiled_poses import Pose
+from bsmap_cli.geometry.compiled_poses import Pose, as_pose
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.mapping.segmentation import Clusters
@@ -71,9 +71,9 @@ class LocalSlam:
         self._follower = Follower(self.settings)
 
     @property
-    def last_step(self) -> SE2:
+    def last_step(self) -> Pose:
         """Motion of the base between the last two scans, in its own frame."""
-        return SE2(*self._motion.step)
+        return self._motion.step
 
     def process(
         self,
@@ -88,8 +88,8 @@ class LocalSlam:
         if not self.submaps:
             self._begin_submap()
             self._motion = self._moved((0.0, 0.0, 0.0), odometry, None)
-            keyframe = self._insert(scan_index, clusters, None, False)
-            return Tracked(self._pose, keyframe, False, False)
+            first = self._insert(scan_index, clusters, None, False)
+            return Tracked(self._pose, first, False, False)
         blind = stretch if pose_odom_base is None else 1.0
         followed = self._follow(clusters, odometry, blind)
         if followed.plain:
@@ -172,7 +172,7 @@ class LocalSlam:
         """The motion after a step, and the information of the match that measured it."""
         vague_m = 0.0 if information is None else worst_sigma_m(information)
         rule, measured = self._follower.motion_rule, information is not None
-        return moved_on(self._motion, tuple(step), odometry, measured, vague_m, rule)
+        return moved_on(self._motion, as_pose(step), odometry, measured, vague_m, rule)
 
     @property
     def older(self) -> Submap:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bsmap_cli.geometry.compiled_poses import as_pose
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.scan_levels import ScanLevels
@@ -88,7 +89,7 @@ class Localizer:
 
     def process(self, scan: Scan) -> None:
         """Find or follow the robot by one more scan."""
-        step = self._local.last_step if self._local else SE2(*self._motion.step)
+        step = self._local.last_step if self._local else self._motion.step
         clusters = self._front.clusters(scan, step)
         self._stamps_ns.append(scan.stamp_ns)
         if self._local is None:
@@ -132,7 +133,7 @@ class Localizer:
         step = self._pose.inverse() @ pose
         vague_m = worst_sigma_m(result.information) if measured else 0.0
         self._motion = moved_on(
-            self._motion, tuple(step), odometry, measured, vague_m, self._motion_rule
+            self._motion, as_pose(step), odometry, measured, vague_m, self._motion_rule
         )
         self._pose = pose
         self._poses.extend(pose.as_array())
@@ -192,7 +193,7 @@ class Localizer:
             self._settle(pose, tracked.pose_local)
             odometry = told(scan.pose_odom_base)
             self._motion = moved_on(
-                self._motion, tuple(local.last_step), odometry, False, 0.0, self._motion_rule
+                self._motion, local.last_step, odometry, False, 0.0, self._motion_rule
             )
 
     def _find(self, local: LocalSlam, pose_local: SE2) -> SE2 | None:

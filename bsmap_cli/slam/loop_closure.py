@@ -122,22 +122,27 @@ class LoopCloser:
         metres, radians = self.graph.deviations_from(keyframe.submap)
         view_m = median_range(keyframe.clusters.points)
         reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
-        waits = self._next_try[:count] > self._travelled_m
-        away = self._viewpoints.away(self.graph.poses, here, view_m, reach_m, waits)
-        if (
-            reach_m.max() > WIDE_STEPS * unit
-            and ((away < 1.0) & (reach_m > WIDE_STEPS * unit)).any()
-        ):
+        nearest = self._nearest(here, view_m, reach_m, most)
+        wide_m = WIDE_STEPS * unit
+        if any(reach_m[k] > wide_m for k in nearest):
             far_m = self.graph.far_deviations_from(keyframe.submap)[:count]
-            widest_m = np.maximum(settings.deviations * far_m, WIDE_STEPS * unit)
-            reach_m = np.minimum(reach_m, widest_m)
-            away = self._viewpoints.away(self.graph.poses, here, view_m, reach_m, waits)
-        nearest = np.argsort(away, kind="stable")[:most].tolist()
+            reach_m = np.minimum(reach_m, np.maximum(settings.deviations * far_m, wide_m))
+            nearest = self._nearest(here, view_m, reach_m, most)
         return [
             (self.local.submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
             for k in nearest
-            if away[k] < 1.0
         ]
+
+    def _nearest(self, here: SE2, view_m: float, reach_m: Vector, most: int) -> list[int]:
+        return self._viewpoints.nearest(
+            self.graph.poses,
+            here,
+            view_m,
+            reach_m,
+            next_try_m=self._next_try,
+            travelled_m=self._travelled_m,
+            most=most,
+        )
 
     def _remember(self, count: int) -> None:
         """Keep where finished submaps were seen from, and when each may be tried."""

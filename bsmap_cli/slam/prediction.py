@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bsmap_cli.geometry.compiled import inlined
-from bsmap_cli.geometry.compiled_poses import Pose, relative
+from bsmap_cli.geometry.compiled_poses import Pose, as_pose, relative
 from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.settings import setting
@@ -141,7 +141,7 @@ def unknown_motion(settings: PredictionSettings, finest_step_m: float) -> Motion
 
 def told(pose_odom_base: SE2 | None) -> Pose:
     """Odometry of a scan as compiled code knows it."""
-    return UNTOLD if pose_odom_base is None else tuple(pose_odom_base)
+    return UNTOLD if pose_odom_base is None else as_pose(pose_odom_base)
 
 
 @inlined

@@ -82,7 +82,7 @@ class Slam:
         """Track one scan, insert it if it is a keyframe, and look for loops."""
         settings = self.settings
         started = time.perf_counter()
-        step = self._local.last_step if self._local else SE2.identity()
+        step = self._local.last_step if self._local else (0.0, 0.0, 0.0)
         clusters = self._front.clusters(scan, step)
         if self._local is None or self._closer is None:
             self._local = LocalSlam(settings, self._front.sigma_m)

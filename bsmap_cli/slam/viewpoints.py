@@ -16,7 +16,7 @@ EVERY = 4  # a viewpoint of so many is kept: keyframes lie close together
 
 
 @kernel
-def _ways(
+def _nearest(
     poses: Points,
     x: float,
     y: float,
@@ -25,20 +25,35 @@ def _ways(
     starts: Integers,
     view_m: float,
     reach_m: Vector,
-    waits: NDArray[np.bool_],
-    away: Vector,
-) -> None:
-    for k in range(len(away)):
-        away[k] = math.inf
+    next_try_m: Vector,
+    travelled_m: float,
+    nearest: Integers,
+) -> int:
+    """Write the nearest submaps that may show what is seen; their number."""
+    found = 0
+    ways = np.empty(len(nearest))
+    for k in range(len(reach_m)):
         within = view_m + reach_m[k]
         dx, dy = x - poses[k, 0], y - poses[k, 1]
-        if waits[k] or math.hypot(dx, dy) > extents_m[k] + within:
+        if next_try_m[k] > travelled_m or math.hypot(dx, dy) > extents_m[k] + within:
             continue
         cos, sin = math.cos(poses[k, 2]), math.sin(poses[k, 2])
         seen_x, seen_y = cos * dx + sin * dy, cos * dy - sin * dx
+        away = math.inf
         for p in range(starts[k], starts[k + 1]):
             way = math.hypot(points[p, 0] - seen_x, points[p, 1] - seen_y)
-            away[k] = min(away[k], way / within)
+            away = min(away, way / within)
+        if away >= 1.0:
+            continue
+        place = min(found, len(nearest))
+        while place > 0 and ways[place - 1] > away:
+            if place < len(nearest):
+                ways[place], nearest[place] = ways[place - 1], nearest[place - 1]
+            place -= 1
+        if place < len(nearest):
+            ways[place], nearest[place] = away, k
+            found = min(found + 1, len(nearest))
+    return found
 
 
 def median_range(points: NDArray[np.float32]) -> float:
@@ -70,15 +85,35 @@ class Viewpoints:
         self._points = np.concatenate((self._points, seen_from))
         self._starts = np.append(self._starts, len(self._points))
 
-    def away(
-        self, poses: Points, here: SE2, view_m: float, reach_m: Vector, waits: NDArray[np.bool_]
-    ) -> Vector:
-        """(n,) way from here to the nearest viewpoint of each submap, as a share of what matters.
+    def nearest(
+        self,
+        poses: Points,
+        here: SE2,
+        view_m: float,
+        reach_m: Vector,
+        *,
+        next_try_m: Vector,
+        travelled_m: float,
+        most: int,
+    ) -> list[int]:
+        """The submaps that may show what is seen from here, at most so many, nearest first.
 
-        That is how far one sees from here and how far the submap may lie off; inf far beyond it,
-        and for those that wait. poses : (n, 3) of the submaps in the frame of `here`.
+        How near one is counts as a share of what matters: how far one sees from here and how far
+        the submap may lie off. Those whose next try is due only farther on the way are left out.
+        poses : (n, 3) of the submaps in the frame of `here`.
         """
-        found = np.empty(len(reach_m))
-        extents, points, starts = self._extents_m, self._points, self._starts
-        _ways(poses, here.x, here.y, extents, points, starts, view_m, reach_m, waits, found)
-        return found
+        found = np.empty(most, np.int64)
+        count = _nearest(
+            poses,
+            here.x,
+            here.y,
+            self._extents_m,
+            self._points,
+            self._starts,
+            view_m,
+            reach_m,
+            next_try_m,
+            travelled_m,
+            found,
+        )
+        return list(found[:count].tolist())
