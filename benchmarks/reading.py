@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 from time import perf_counter
 
+from bsmap_cli.cli.door import collect_seldom
 from bsmap_cli.logs.open_log import open_log
 from bsmap_cli.logs.reader import ReadOptions
 
@@ -29,6 +30,7 @@ def main() -> None:
     parser.add_argument("logs", nargs="+", type=Path)
     parser.add_argument("--runs", type=int, default=3)
     arguments = parser.parse_args()
+    collect_seldom()  # as the command does
     print(f"{'':<32}{'odometry':>9}{'scans':>8}{'scans/s':>9}{'MB/s':>7}")
     for log in arguments.logs:
         files = [log] if log.is_file() else [path for path in log.rglob("*") if path.is_file()]

@@ -20,9 +20,11 @@ def as_pose(pose: Pose) -> Pose:
 
 @inlined
 def wrapped(angle_rad: float) -> float:
-    """The same angle in (-pi, pi]."""
+    """The same angle in [-pi, pi]."""
+    if -math.pi < angle_rad <= math.pi:
+        return angle_rad
     turns = math.ceil(angle_rad / math.tau - 0.5)
-    return angle_rad - turns * math.tau
+    return max(-math.pi, min(math.pi, angle_rad - turns * math.tau))
 
 
 @inlined

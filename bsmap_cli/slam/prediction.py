@@ -20,6 +20,7 @@ LONGEST_S = 0.5  # no robot gathers speed for longer
 FOLLOWING = 0.6  # of a match's deviation is in the step to it: two in a row err alike
 ODOMETRY_DRIFT = 0.1  # of the way and of the turn: what raw odometry slips at its worst
 ODOMETRY_TURN = 0.001  # and turns on a straight way [rad per finest knot step]
+LEAST_SIGMA = 1e-6  # of any prediction [m] and [rad]: none is so sure that scans count for nothing
 UNTOLD = (math.nan, math.nan, math.nan)  # where the log has no odometry
 
 
@@ -156,8 +157,8 @@ def predict(motion: Motion, odometry: Pose, elapsed_s: float, rule: MotionRule) 
         turn = abs(step[2])
         return Prediction(
             step,
-            rule.odometry_m + way,
-            rule.odometry_rad + turn,
+            max(rule.odometry_m + way, LEAST_SIGMA),
+            max(rule.odometry_rad + turn, LEAST_SIGMA),
             ODOMETRY_DRIFT * way,
             ODOMETRY_DRIFT * turn + ODOMETRY_TURN * way / rule.unit_m,
             True,
@@ -165,8 +166,9 @@ def predict(motion: Motion, odometry: Pose, elapsed_s: float, rule: MotionRule) 
     within_s = min(elapsed_s, LONGEST_S)
     started_m = rule.acceleration_m_s2 * within_s * within_s
     started_rad = rule.acceleration_rad_s2 * within_s * within_s
-    sigma_m = max(rule.margin * motion.spread_m, magnitude(started_m, motion.vague_m))
-    sigma_rad = max(rule.margin * motion.spread_rad, started_rad)
+    vague_m = max(magnitude(started_m, motion.vague_m), LEAST_SIGMA)
+    sigma_m = max(rule.margin * motion.spread_m, vague_m)
+    sigma_rad = max(rule.margin * motion.spread_rad, started_rad, LEAST_SIGMA)
     return Prediction(motion.step, sigma_m, sigma_rad, sigma_m, sigma_rad, False)
 
 
