@@ -47,6 +47,7 @@ class SimulatedLog:
     simulation: Simulation
     kept: np.ndarray
     report: ReadReport = field(default_factory=ReadReport)
+    is_stream: bool = False
 
     def __enter__(self) -> LogReader:
         return self

@@ -9,6 +9,7 @@ points (n, 3) float64 of all returns in the base frame, z = 0, starts (scans + 1
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 from collections.abc import Callable
@@ -91,6 +92,7 @@ PEERS = {"kiss-icp": kiss_icp, "small_gicp": small_gicp, "small_gicp, 3 layers":
 
 def main() -> None:
     """Run one peer; write (scans, 3) poses, print seconds and memory."""
+    gc.set_threshold(50_000, 50, 50)  # as `bsmap` has it
     peer, scans, poses = sys.argv[1:]
     with np.load(scans) as held:
         points, starts, guesses = held["points"], held["starts"], held["guesses"]

@@ -40,7 +40,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def collect_seldom() -> None:
-    """Let Python seldom look for cycles, of which scans and maps make none."""
+    """Let Python seldom look for cycles: numba keeps its own, scans and maps hold none."""
     gc.set_threshold(YOUNG_OBJECTS, 50, 50)
 
 

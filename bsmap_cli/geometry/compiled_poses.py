@@ -1,6 +1,6 @@
 """Rigid motions of the plane for compiled code, eq. (2): tuples of x [m], y [m], theta [rad].
 
-Called from Python they do what `SE2` does.
+They are those of `SE2`, but for the last digit, and for headings of either -pi or pi.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ def as_pose(pose: Pose) -> Pose:
 def wrapped(angle_rad: float) -> float:
     """The same angle in [-pi, pi]."""
     if -math.pi < angle_rad <= math.pi:
+        return angle_rad
+    if not abs(angle_rad) < math.inf:
         return angle_rad
     turns = math.ceil(angle_rad / math.tau - 0.5)
     return max(-math.pi, min(math.pi, angle_rad - turns * math.tau))

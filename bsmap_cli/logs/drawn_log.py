@@ -21,6 +21,11 @@ class DrawnLog(ABC):
         self._options = options
         self._drawn: Generator[Scan, None, None] | None = None
 
+    @property
+    def is_stream(self) -> bool:
+        """See `LogReader.is_stream`."""
+        return any(source.path is None for source in self._sources)
+
     def __enter__(self) -> LogReader:
         return self
 

@@ -117,6 +117,11 @@ class LogReader(Protocol):
 
     report: ReadReport
 
+    @property
+    def is_stream(self) -> bool:
+        """Whether the next scan may not be written yet."""
+        ...
+
     def __enter__(self) -> LogReader: ...
 
     def __exit__(self, *exc: object) -> None: ...

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 MOST_AHEAD = 64  # scans that are read at a time
-LONGEST_S = 0.01  # that reading them may take
 
 
 class Progress(Protocol):
@@ -82,23 +81,25 @@ class Feed:
             )
 
     def _read(self) -> Iterator[Scan]:
-        """The scans, some of them read ahead: what is done over and over stays in the caches.
+        """The scans, read some at a time: what is done over and over stays in the caches.
 
-        A reader that waits for its log to be written is not waited for, and where it fails, the
-        scans before come first.
+        From a stream they come one by one, as the next may not be written yet. Where reading
+        fails, the scans before come first.
         """
+        most = 1 if self.reader.is_stream else MOST_AHEAD
         source = iter(self.reader.scans())
         failure: Exception | None = None
         ended = False
         while not ended:
-            began = now = perf_counter()
+            began = perf_counter()
             ahead: list[Scan] = []
             try:
-                while len(ahead) < MOST_AHEAD and now - began < LONGEST_S:
-                    ahead.append(next(source))
-                    now = perf_counter()
-            except StopIteration:
-                ended = True
+                while len(ahead) < most and not ended:
+                    scan = next(source, None)
+                    if scan is None:
+                        ended = True
+                    else:
+                        ahead.append(scan)
             except Exception as error:  # told once the scans before it are through
                 ended, failure = True, error
             self.read_s += perf_counter() - began

@@ -37,7 +37,8 @@ class Followed(NamedTuple):
 
     plain : it lies where it was expected, and walls say so in all directions. Only then pose,
     motion and due are those after this scan; else they are those before.
-    prediction, match : what was expected, and what was found, its pose in the submap's frame.
+    prediction, match : what was expected, and what was found, its pose in the submap's frame; no
+    match where scans are registered by another method.
     due : the base has moved far enough for a keyframe.
     """
 
@@ -45,7 +46,7 @@ class Followed(NamedTuple):
     pose_local: SE2
     motion: Motion
     prediction: Prediction
-    match: RegistrationResult
+    match: RegistrationResult | None
     due: bool
 
 
@@ -137,14 +138,18 @@ class Follower:
         """Predict the next scan's pose from the last one and register it on the finest level.
 
         origin, last, last_keyframe : poses in the local frame, of the level, the base at the last
-        scan and at the last keyframe. enough : share of its points that must lie on the level.
+        scan and at the last keyframe. enough : share of its points that must lie on the level; of
+        infinity no scan is plain.
         """
+        if self._registration.method != "points":
+            prediction = predict(motion, odometry, elapsed_s, self.motion_rule)
+            return Followed(False, last, motion, prediction, None, False)
         if self._rules[0] != sigma_m:
             gates = gates_of(self._registration, self._unit, sigma_m)
             rules = tuple(self.motion_rule), tuple(gates), tuple(self.keyframe_rule)
             self._rules = sigma_m, rules
         pose, hessian = np.empty(3), np.empty((3, 3))
-        plain, due, here, moved, prediction, ratio, rms_m, steps, degenerate = _follow(
+        plain, due, here, moved, expected, ratio, rms_m, steps, degenerate = _follow(
             tuple(level.arrays),
             level.matrix,
             level.knot_step_m,
@@ -166,4 +171,4 @@ class Follower:
         match = RegistrationResult(
             pose, hessian, ratio, rms_m, steps, degenerate, len(clusters.points)
         )
-        return Followed(plain, SE2(*here), Motion(*moved), Prediction(*prediction), match, due)
+        return Followed(plain, SE2(*here), Motion(*moved), Prediction(*expected), match, due)

@@ -84,15 +84,15 @@ def track_down(
     prior_information: Points,
     *,
     enough: float,
-    finest: RegistrationResult | None,
+    finest: RegistrationResult | None = None,
     sigma_m: float,
     settings: SlamSettings,
 ) -> RegistrationResult:
     """Register the scan that follows the last one, by the method that is set.
 
-    enough, finest : as in `register_near`; scans that follow each other closely begin within reach
-    of the finest level, and most end there. Where curves are registered to curves, the points say
-    in the end how well the pose fits.
+    enough, finest : as in `register_near`, for points alone; scans that follow each other closely
+    begin within reach of the finest level, and most end there. Where curves are registered to
+    curves, the points say in the end how well the pose fits.
     """
     method = settings.registration.method
     if method == "points":

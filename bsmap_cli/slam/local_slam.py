@@ -19,6 +19,7 @@ from bsmap_cli.slam.following import Followed, Follower
 from bsmap_cli.slam.keyframes import Keyframe, is_keyframe
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan, share_enough
 from bsmap_cli.slam.prediction import (
+    UNTOLD,
     Cadence,
     Motion,
     moved_on,
@@ -90,9 +91,9 @@ class LocalSlam:
             self._motion = self._moved((0.0, 0.0, 0.0), odometry, None)
             first = self._insert(scan_index, clusters, None, False)
             return Tracked(self._pose, first, False, False)
-        blind = stretch if pose_odom_base is None else 1.0
+        blind = stretch if odometry is UNTOLD else 1.0
         followed = self._follow(clusters, odometry, blind)
-        if followed.plain:
+        if followed.plain and followed.match:
             match, due, lost = followed.match, followed.due, False
             self._pose, self._motion = followed.pose_local, followed.motion
             self._lost_scans, self._afresh = 0, False

@@ -30,6 +30,7 @@ from bsmap_cli.slam.likelihood import sample_surfaces
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.matching import FEWEST_POINTS, match_scan
 from bsmap_cli.slam.prediction import (
+    UNTOLD,
     Cadence,
     motion_rule,
     moved_on,
@@ -117,7 +118,7 @@ class Localizer:
             clusters,
             self._pose,
             prediction,
-            blind=stretch if scan.pose_odom_base is None else 1.0,
+            blind=stretch if odometry is UNTOLD else 1.0,
             explained=self._usual_ratio,
             growing=False,
             sigma_m=self._front.sigma_m,

@@ -20,7 +20,7 @@ LONGEST_S = 0.5  # no robot gathers speed for longer
 FOLLOWING = 0.6  # of a match's deviation is in the step to it: two in a row err alike
 ODOMETRY_DRIFT = 0.1  # of the way and of the turn: what raw odometry slips at its worst
 ODOMETRY_TURN = 0.001  # and turns on a straight way [rad per finest knot step]
-LEAST_SIGMA = 1e-6  # of any prediction [m] and [rad]: none is so sure that scans count for nothing
+LEAST_SIGMA = 1e-6  # of any prediction [m] and [rad], so that its information is finite
 UNTOLD = (math.nan, math.nan, math.nan)  # where the log has no odometry
 
 
@@ -118,10 +118,10 @@ def motion_rule(settings: PredictionSettings, finest_step_m: float) -> MotionRul
         odometry_m=settings.odometry_sigma * finest_step_m,
         odometry_rad=math.radians(settings.odometry_sigma_deg),
         unit_m=finest_step_m,
-        margin=settings.motion_margin,
+        margin=float(settings.motion_margin),
         floor_m=settings.motion_floor * finest_step_m / settings.motion_margin,
         floor_rad=0.1 * math.radians(settings.motion_sigma_deg) / settings.motion_margin,
-        acceleration_m_s2=settings.acceleration_m_s2,
+        acceleration_m_s2=float(settings.acceleration_m_s2),
         acceleration_rad_s2=math.radians(settings.acceleration_deg_s2),
     )
 
@@ -141,8 +141,10 @@ def unknown_motion(settings: PredictionSettings, finest_step_m: float) -> Motion
 
 
 def told(pose_odom_base: SE2 | None) -> Pose:
-    """Odometry of a scan as compiled code knows it."""
-    return UNTOLD if pose_odom_base is None else as_pose(pose_odom_base)
+    """Odometry of a scan as compiled code knows it; what is no number is not told."""
+    if pose_odom_base is None or not all(map(math.isfinite, pose_odom_base)):
+        return UNTOLD
+    return as_pose(pose_odom_base)
 
 
 @inlined

@@ -109,8 +109,8 @@ def gates_of(settings: RegistrationSettings, knot_step_m: float, sigma_m: float)
         kernel_m=max(settings.kernel * knot_step_m, 2.0 * sigma_m),
         inlier_m=max(settings.inlier * knot_step_m, 3.0 * sigma_m),
         iterations=settings.iterations,
-        degenerate=settings.degenerate,
-        certain=settings.certain,
+        degenerate=float(settings.degenerate),
+        certain=float(settings.certain),
     )
 
 

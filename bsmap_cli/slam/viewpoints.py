@@ -116,4 +116,5 @@ class Viewpoints:
             travelled_m,
             found,
         )
-        return list(found[:count].tolist())
+        nearest: list[int] = found[:count].tolist()
+        return nearest

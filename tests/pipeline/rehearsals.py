@@ -60,6 +60,8 @@ def _asked(query: MapQuery) -> None:
 class Rehearsed:
     """The first scans of a simulation as a log."""
 
+    is_stream = False
+
     def __init__(self, made: Simulation) -> None:
         self.report = ReadReport()
         self._made = made

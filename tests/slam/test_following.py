@@ -8,6 +8,7 @@ import pytest
 
 from bsmap_cli.config import load_settings
 from bsmap_cli.geometry.se2 import SE2
+from bsmap_cli.sensor.simulator.simulation import simulate
 from bsmap_cli.slam.following import Follower
 from bsmap_cli.slam.prediction import (
     LEAST_SIGMA,
@@ -19,6 +20,7 @@ from bsmap_cli.slam.prediction import (
     worst_sigma_m,
 )
 from bsmap_cli.slam.registration import register
+from bsmap_cli.slam.slam import Slam
 from tests.slam.rooms import CENTRE, corridor_parts, map_of, room_parts, seen_from
 
 SETTINGS = load_settings()
@@ -113,3 +115,37 @@ def test_no_prediction_is_so_sure_that_it_cannot_be_weighed():
     prediction = predict(motion, (1.0, 2.0, 0.5), 0.1, motion_rule(sure, UNIT))
     assert prediction.sigma_m == prediction.sigma_rad == LEAST_SIGMA
     assert np.isfinite(prediction.information()).all()
+
+
+@pytest.mark.parametrize("told", ["all", "none", "some"])
+def test_a_scan_is_tracked_alike_whether_it_is_plain_or_not(told, monkeypatch):
+    """On one level the longer way makes the same match, and must leave the same behind."""
+    settings = replace(SETTINGS, ladder=(0.1,))
+    sim = simulate("spin", lidar="ust10lx", noise_m=0.01, rate_hz=8.0)
+    scans = [
+        scan if told == "all" or (told == "some" and k % 20 < 12) else without_odometry(scan)
+        for k, scan in zip(range(120), sim.scans(), strict=False)
+    ]
+
+    def driven():
+        slam = Slam(replace(settings, loops=replace(settings.loops, enabled=False)))
+        for scan in scans:
+            slam.process(scan)
+        return slam._local, slam._log
+
+    local, log = driven()
+    plainly = Follower.follow
+    monkeypatch.setattr(
+        Follower, "follow", lambda *a, **k: plainly(*a, **{**k, "enough": math.inf})
+    )
+    other, other_log = driven()
+    assert np.array(log.poses) == pytest.approx(np.array(other_log.poses), abs=1e-7)
+    assert log.keyframes == other_log.keyframes
+    flat = [np.hstack(one._motion) for one in (local, other)]
+    assert flat[0] == pytest.approx(flat[1], abs=1e-6, nan_ok=True)
+    for name in ("_lost_scans", "_afresh", "_coasted_m", "_coasted_rad", "_explained", "_overlap"):
+        assert getattr(local, name) == pytest.approx(getattr(other, name), abs=1e-9)
+
+
+def without_odometry(scan):
+    return replace(scan, pose_odom_base=None)

@@ -11,6 +11,7 @@ from bsmap_cli.evaluation.map_quality import map_quality
 from bsmap_cli.evaluation.true_surfaces import cut_surfaces
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.sensor.simulator.simulation import simulate
+from bsmap_cli.slam import curve_matching, ladder
 from bsmap_cli.slam.slam import Slam
 
 
@@ -53,6 +54,20 @@ def test_the_other_registrations_run_on_the_paper_s_map(method):
     metres, radians, *_ = drive("spin", 120, f"registration.method={method}")
     assert metres <= 0.003
     assert math.degrees(radians) < 0.2
+
+
+@pytest.mark.parametrize("method", ["joint", "joint_first", "curve"])
+def test_the_method_that_is_set_registers_every_scan(method, monkeypatch):
+    called = []
+
+    def noted(*arguments, **rest):
+        called.append(method)
+        return curve_matching.match_curves(*arguments, **rest)
+
+    monkeypatch.setattr(ladder, "match_curves", noted)
+    drive("spin", 30, f"registration.method={method}", profile="default", noise_m=0.01)
+    levels = 1 if method == "joint_first" else 3
+    assert len(called) >= levels * 29  # all but the first
 
 
 @pytest.mark.parametrize("method", ["joint", "joint_first", "curve"])
