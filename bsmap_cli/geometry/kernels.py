@@ -96,45 +96,6 @@ def polynomial_jet(polynomial: Array, f: float) -> tuple[float, float, float, fl
 
 
 @inlined
-def foot_point(
-    points: Array,
-    matrix: Array,
-    row: int,
-    f: float,
-    first_row: int,
-    last_row: int,
-    px: float,
-    py: float,
-    steps: int,
-    polynomial: Array,
-) -> tuple[int, float]:
-    """Newton steps towards the point of the curve nearest to (px, py), from span `row` at f.
-
-    The search may walk over the spans `first_row` .. `last_row` of the curve and ends inside
-    them. Two steps from within half a span leave a tangential residual far below the noise.
-    """
-    span_polynomial(points, row, matrix, polynomial)
-    for _ in range(steps):
-        x, y, dx, dy, ddx, ddy = polynomial_jet(polynomial, f)
-        ex, ey = x - px, y - py
-        speed2 = dx * dx + dy * dy
-        curvature = ex * ddx + ey * ddy
-        step = (ex * dx + ey * dy) / (speed2 + max(curvature, -0.5 * speed2) + 1e-300)
-        f -= min(1.0, max(-1.0, step))
-        if f < 0.0 and row > first_row:
-            row -= 1
-            f += 1.0
-            span_polynomial(points, row, matrix, polynomial)
-        elif f > 1.0 and row < last_row:
-            row += 1
-            f -= 1.0
-            span_polynomial(points, row, matrix, polynomial)
-        if abs(step) < 1e-6:
-            break
-    return row, min(1.0, max(0.0, f))
-
-
-@inlined
 def _eliminate_row(band: Array, rhs: Array, i: int, reach: int) -> None:
     """One column of the Cholesky factor, and what it takes from the `reach` - 1 rows below."""
     inverse = 1.0 / math.sqrt(band[i, 0])

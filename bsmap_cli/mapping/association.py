@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, lean
-from bsmap_cli.geometry.kernels import foot_point, magnitude, polynomial_jet
+from bsmap_cli.geometry.foot_points import NO_JET, foot_point, span_jet
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import nearest_span
@@ -22,6 +23,7 @@ from bsmap_cli.settings import setting
 
 MIN_COSINE = 0.5  # a curve is a candidate when it runs within 60 degrees of the scan
 NEWTON_STEPS = 4
+AT_FOOT = 1e-6  # a point so near to being above its foot point is there [knot steps]
 END_TOLERANCE = 0.25  # a foot point may lie this far beyond the data [knot steps]
 
 
@@ -60,7 +62,6 @@ def match_points(
     gate_m: float,
     curves: NDArray[np.int64],
     u: Vector,
-    polynomial: Points,
 ) -> None:
     """Write curve (-1: none) and parameter u of each point's foot point.
 
@@ -68,47 +69,48 @@ def match_points(
     between two curves that lie close together.
     """
     degree = matrix.shape[0] - 1
+    jet = NO_JET
     for c in range(len(starts) - 1):
         row, f = -1, 0.0
         for j in range(starts[c], starts[c + 1]):
             curves[j] = -1
-            tx, ty = tangents[j, 0], tangents[j, 1]
-            for attempt in range(2):
-                if attempt == 1 or row < 0:
-                    row, f = nearest_span(
-                        level, knot_step_m, points[j, 0], points[j, 1], tx, ty, gate_m, MIN_COSINE
-                    )
+            px, py, tx, ty = points[j, 0], points[j, 1], tangents[j, 0], tangents[j, 1]
+            asked = False
+            while curves[j] < 0:
+                if row < 0:
+                    if asked:
+                        break
+                    row, f = nearest_span(level, knot_step_m, px, py, tx, ty, gate_m, MIN_COSINE)
+                    asked = True
                     if row < 0:
                         break
+                    jet = span_jet(level.points, row, matrix, f)
                 curve = level.owner[row]
                 first_row, last_row = usable_rows(level, curve, degree)
-                row, f = foot_point(
+                row, f, jet = foot_point(
                     level.points,
                     matrix,
                     row,
                     f,
+                    jet,
                     first_row,
                     last_row,
-                    points[j, 0],
-                    points[j, 1],
+                    px,
+                    py,
                     NEWTON_STEPS,
-                    polynomial,
+                    AT_FOOT * knot_step_m,
                 )
-                x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
-                ex, ey = points[j, 0] - x, points[j, 1] - y
-                speed = magnitude(dx, dy) + 1e-300
-                beyond = abs(ex * dx + ey * dy) / speed > END_TOLERANCE * knot_step_m
-                along = (dx * tx + dy * ty) / speed
-                indexed = level.span_cell[row] >= 0
+                ex, ey = px - jet.x, py - jet.y
+                speed = magnitude(jet.dx, jet.dy) + 1e-300
+                along_m = (ex * jet.dx + ey * jet.dy) / speed
                 if (
-                    indexed
-                    and not beyond
-                    and along > MIN_COSINE
+                    abs(along_m) <= END_TOLERANCE * knot_step_m
+                    and jet.dx * tx + jet.dy * ty > MIN_COSINE * speed
                     and ex * ex + ey * ey <= gate_m * gate_m
+                    and level.span_cell[row] >= 0
                 ):
                     curves[j] = curve
                     u[j] = level.first[curve] + degree + row - level.offset[curve] + f
-                    # beyond an end the foot point stops, the parameter goes on
-                    u[j] += (ex * dx + ey * dy) / (speed * knot_step_m)
-                    break
-                row = -1
+                    u[j] += along_m / knot_step_m  # beyond an end the foot point stops, u goes on
+                else:
+                    row = -1

@@ -72,7 +72,6 @@ def _fuse_piece(
         settings.association.track_dist * step,
         curves,
         u,
-        np.empty((curve_map.degree + 1, 2)),
     )
     runs = np.empty((2 * n + 2, 5), np.int64)
     least_m = settings.segmentation.min_length * step

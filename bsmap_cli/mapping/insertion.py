@@ -79,7 +79,6 @@ def _place_and_plan(
         tangents[j, 0] = cos * tangents_body[j, 0] - sin * tangents_body[j, 1]
         tangents[j, 1] = sin * tangents_body[j, 0] + cos * tangents_body[j, 1]
         u[j] = 0.0
-    polynomial = np.empty((matrix.shape[0], 2))
     match_points(
         level,
         matrix,
@@ -90,7 +89,6 @@ def _place_and_plan(
         gate_m,
         room.curves,
         u,
-        polynomial,
     )
     return plan_runs(level, points, starts, room.curves, u, knot_step_m, least, room.runs)
 

@@ -128,7 +128,6 @@ def pair_by_votes(curve_map: CurveMap, curves: list[Curve], pose: Vector) -> Cur
         VOTE_REACH * step,
         found,
         u_map,
-        np.empty((curve_map.degree + 1, 2)),
     )
     for curve, u, (a, b) in zip(curves, us, pairwise(starts), strict=True):
         _count_votes(pairs, curve, u, found[a:b], u_map[a:b])

@@ -21,10 +21,14 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
-from bsmap_cli.slam.point_equations import accumulate
+from bsmap_cli.slam.point_equations import CONTACT, accumulate, touch
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; a quarter of it is left
+NEAR = 0.25  # so far a curve is like its circle: then foot points are found anew [knot steps]
+SETTLED = (
+    0.05  # where the iteration ends after so little way, no other curves are near [knot steps]
+)
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
@@ -56,13 +60,13 @@ class RegistrationSettings:
     )
     iterations: int = setting(12, "most Gauss-Newton steps a level", minimum=1)
     degenerate: float = setting(
-        1.0,
+        0.5,
         "a direction is observed when its information exceeds so many times what the noise of "
-        "the curves' tangents alone would feign",
+        "one scan's tangents alone would feign",
         minimum=0.0,
     )
     certain: float = setting(
-        0.1,
+        0.05,
         "while tracking it is observed, too, when points that no such noise explains give it so "
         "many times that",
         minimum=0.0,
@@ -134,31 +138,41 @@ def gauss_newton(
     rows, places, variances = np.full(len(points), -1), np.empty(len(points)), np.empty(len(points))
     for j in range(len(points)):
         variances[j] = SHARED * (sigma_m**2 / counts[j] + (MODEL_ERROR * knot_step_m) ** 2)
-    gradient, system, polynomial = np.empty(3), np.empty((3, 3)), np.empty((matrix.shape[0], 2))
-    jacobian = np.empty((len(points), 5))
+    gradient, system = np.empty(3), np.empty((3, 3))
+    jacobian, contacts = np.empty((len(points), 5)), np.empty((len(points), CONTACT))
     right, delta, wanted = np.empty(3), np.empty(3), np.empty(3)
     start = pose.copy()
     found = 0
     steps = 0
+    moved, near = math.inf, NEAR
     for _ in range(gates.iterations):
+        if moved > near * knot_step_m:
+            touch(
+                level,
+                matrix,
+                knot_step_m,
+                points,
+                tangents,
+                pose,
+                gates.gate_m,
+                gates.inlier_m,
+                rows,
+                places,
+                contacts,
+            )
+            moved = 0.0
         accumulate(
-            level,
-            matrix,
-            knot_step_m,
             points,
-            tangents,
             variances,
+            rows,
+            contacts,
             pose,
-            gates.gate_m,
             gates.kernel_m,
             gates.inlier_m,
-            rows,
-            places,
             hessian,
             gradient,
             tally,
             jacobian,
-            polynomial,
         )
         steps += 1
         for i in range(3):
@@ -178,9 +192,12 @@ def gauss_newton(
         found = keep_unobserved(hessian, jacobian, lever, least, certain, wanted, delta)
         for i in range(3):
             pose[i] += delta[i]
-        moved = magnitude(delta[0], delta[1]) + lever * abs(delta[2])
-        if moved < STILL * knot_step_m:
+        step_m = magnitude(delta[0], delta[1]) + lever * abs(delta[2])
+        moved += step_m
+        still = step_m < STILL * knot_step_m
+        if still and moved <= SETTLED * knot_step_m:
             break
+        near = SETTLED if still else NEAR
     return steps, found
 
 
