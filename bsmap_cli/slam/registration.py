@@ -25,10 +25,8 @@ from bsmap_cli.slam.point_equations import CONTACT, accumulate, touch
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; a quarter of it is left
-NEAR = 0.25  # so far a curve is like its circle: then foot points are found anew [knot steps]
-SETTLED = (
-    0.05  # where the iteration ends after so little way, no other curves are near [knot steps]
-)
+NEAR = 0.25  # so far a curve is like its circle; then foot points are found anew [knot steps]
+SETTLED = 0.05  # found anew where the iteration would end after a longer way [knot steps]
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
 
