@@ -21,7 +21,7 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import nearest_span
 
 # Variance of a curve's tangent, per variance of a point over Delta^2 and weight. A thin curve is
-# not taken for worse than THIN, nor one seen often for surer than SURE: scans of one wall err alike,
+# not taken for worse than THIN, nor one seen often for surer than SURE: scans of a wall err alike,
 # by the poses they were laid at and by what the lidar does there.
 TANGENT_NOISE, THIN, SURE = 0.2, 0.1, 1.0
 CONTACT = 6  # foot point x, y [m], unit tangent there, curvature [1/m], variance of the normal
