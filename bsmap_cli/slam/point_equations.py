@@ -147,7 +147,7 @@ def accumulate(
         along, beside = ex * ux + ey * uy, ey * ux - ex * uy
         # nearest point of the circle of that curvature, without dividing by it
         a, b = 1.0 - bend * beside, bend * along
-        radius = math.sqrt(a * a + b * b)
+        radius = math.sqrt(a * a + b * b + 1e-300)
         inverse = 1.0 / (radius * (1.0 + radius))
         residual = (2.0 * beside - bend * (beside * beside + along * along)) * radius * inverse
         inverse *= 1.0 + radius
