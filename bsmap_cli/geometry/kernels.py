@@ -1,4 +1,4 @@
-"""Compiled B-spline kernels on plain arrays: one span, one foot point, one small linear system.
+"""Compiled B-spline kernels on plain arrays: one span, one small linear system.
 
 A span is named by the row of its first control point; `matrix` is `basis_matrix(degree)` and
 f in [0, 1] is the place within the span. Derivatives are with respect to u = tau / Delta.
