@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ MOST_RETURNS = 65535  # that a count can tell
 BATCH = 64  # scans that are unpacked at a time, so that memory does not grow with the log
 
 
-@dataclass(frozen=True, slots=True)
-class CompactClusters:
+class CompactClusters(NamedTuple):
     """`Clusters` of the finest level in float32 and without tangents."""
 
     points: NDArray[np.float32]

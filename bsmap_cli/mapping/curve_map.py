@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -89,6 +90,10 @@ class CurveMap:
         self.arrays = _empty_level(64, rows, 2048)
         self.tracks: Tracks | None = None
         self.folded = False
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """As it was in another process; the matrix is that of this one, which cannot be written."""
+        self.__dict__.update(state, matrix=basis_matrix(state["degree"]))
 
     def __len__(self) -> int:
         return int(self.arrays.sizes[0])

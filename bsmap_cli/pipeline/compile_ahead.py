@@ -58,9 +58,13 @@ def compile_ahead(names: Sequence[str]) -> set[str]:
 def _helpers() -> int:
     if not Path(sys.executable or "").name.startswith("python"):
         return 0  # another program that holds Python: it must not be started anew
+    return min(usable_cores() - 1, MOST_HELPERS)
+
+
+def usable_cores() -> int:
+    """How many cores this process may run on."""
     affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    return min(cores - 1, MOST_HELPERS)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[bytes]:

@@ -21,7 +21,7 @@ from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.pipeline.compile_ahead import compile_for_slam
+from bsmap_cli.pipeline.compile_ahead import compile_for_slam, usable_cores
 from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
 from bsmap_cli.pipeline.memory_needed import refuse_too_large
 from bsmap_cli.sensor.pose_track import PoseTrack
@@ -131,7 +131,9 @@ def run_slam(
         refuse_too_large(old)
         settings = settings_for_map(settings, old)
         known = KnownMap(old, _settings_for(SlamSettings, settings))
-    slam = Slam(_settings_for(SlamSettings, settings), known)
+    # who looks on wants to see closed loops at once, and has threads, beside which none should fork
+    cores = 1 if onlooker else usable_cores()
+    slam = Slam(_settings_for(SlamSettings, settings), known, cores=cores)
     scans = iter(feed)
     first = next(scans)  # what is wrong with the log is told before anything is compiled
     compile_for_slam()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,18 +13,20 @@ from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.mapping.scan_levels import ScanLevels
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
-from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.ladder import register_down
 from bsmap_cli.slam.likelihood import Likelihood
-from bsmap_cli.slam.local_slam import LocalSlam
+from bsmap_cli.slam.loop_tasks import LoopTask, Place
 from bsmap_cli.slam.recovery import CELL_STEPS
-from bsmap_cli.slam.registration import RegistrationResult, RegistrationSettings
+from bsmap_cli.slam.registration import RegistrationResult
 from bsmap_cli.slam.search_window import Window, heights_for
 from bsmap_cli.slam.submap import Submap
 from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.uncertainty import isotropic_information, match_information
 from bsmap_cli.slam.viewpoints import Viewpoints, median_range
 from bsmap_cli.slam.wide_search import search
+
+if TYPE_CHECKING:
+    from bsmap_cli.slam.slam_settings import SlamSettings
 
 LEAST_HEIGHTS, HEIGHTS = 5, 6  # of a likelihood pyramid: blocks of 16 or 32 cells at the top
 DRAWN = 32  # likelihoods of submaps that are kept for the next search
@@ -72,64 +75,70 @@ class Loop:
     information: Points
 
 
-@dataclass(slots=True)
 class LoopCloser:
     """Looks for loops, keyframe by keyframe, and tells the submap graph."""
 
-    local: LocalSlam
-    graph: SubmapGraph
-    loops: list[Loop] = field(default_factory=list)
-    tried: int = 0
-    _doubtful: list[tuple[Loop, SE2]] = field(default_factory=list)
-    _next_try: Vector = field(default_factory=lambda: np.empty(0))
-    _drawn: dict[int, Submap] = field(default_factory=dict)
-    _open: dict[int, Submap] = field(default_factory=dict)
-    _viewpoints: Viewpoints = field(default_factory=Viewpoints)
-    _travelled_m: float = 0.0
-    _refining: RegistrationSettings = field(init=False)
+    def __init__(self, settings: SlamSettings) -> None:
+        self.graph = SubmapGraph(settings.ladder[-1])
+        self.loops: list[Loop] = []
+        self.tried = 0
+        self.settings = settings
+        self._refining = settings.registration.far_off()
+        self._places: list[Place] = []
+        self._submaps: list[Submap] = []
+        self._viewpoints = Viewpoints()
+        self._next_try = np.empty(0)
+        self._travelled_m = 0.0
+        self._doubtful: list[tuple[Loop, SE2]] = []
+        self._drawn: dict[int, Submap] = {}
+        self._open: dict[int, Submap] = {}
 
-    def __post_init__(self) -> None:
-        self._refining = self.local.settings.registration.far_off()
-
-    def process(self, keyframe: Keyframe) -> None:
+    def process(self, task: LoopTask) -> None:
         """Search the nearby old submaps for one keyframe."""
-        if keyframe.index:
-            before = self.local.keyframes[keyframe.index - 1].pose_local
-            step = keyframe.pose_local.relative_to(before)
+        place, settings = task.place, self.settings
+        if self._places:
+            step = place.pose_local.relative_to(self._places[-1].pose_local)
             self._travelled_m += math.hypot(step.x, step.y)
-        self.graph.update()
-        submap = self.local.submaps[keyframe.submap]
-        here = self.graph.pose(submap.index) @ submap.to_submap(keyframe.pose_local)
-        candidates = self._candidates(keyframe, here)
+        self._places.append(place)
+        self._remember(task.finished)
+        self.graph.update(task.links)
+        view_m = median_range(task.clusters.points)
+        here = self.graph.pose(place.submap) @ place.pose_submap_base
+        candidates = self._candidates(place, view_m, here)
         if not candidates:
             return
-        settings, sigma_m = self.local.settings, self.local.sigma_m
-        finest = keyframe.clusters.unpack(settings.ladder[-1], sigma_m)
-        clusters = ScanLevels(finest, settings.ladder, settings.fitting, sigma_m)
+        finest = task.clusters.unpack(settings.ladder[-1], task.sigma_m)
+        clusters = ScanLevels(finest, settings.ladder, settings.fitting, task.sigma_m)
         for submap, reach_m, reach_rad in candidates:
             guess = here.relative_to(self.graph.pose(submap.index)).as_array()
-            self._try(keyframe, clusters, submap, Window(guess, reach_m, reach_rad))
+            window = Window(guess, reach_m, reach_rad)
+            loop = self._try(place, clusters, submap, window, task.sigma_m)
+            if loop is None:
+                continue
+            if reach_m > 10.0 * settings.ladder[-1]:
+                self._confirm(loop, view_m)
+            else:
+                self._accept(loop)
 
-    def _candidates(self, keyframe: Keyframe, here: SE2) -> list[tuple[Submap, float, float]]:
+    def _candidates(
+        self, place: Place, view_m: float, here: SE2
+    ) -> list[tuple[Submap, float, float]]:
         """The finished submaps that most likely see what the keyframe sees, nearest first."""
-        unit, settings = self.local.settings.ladder[-1], self.local.settings.loops
-        count = max(0, keyframe.submap - 1)
+        unit, settings, count = self.settings.ladder[-1], self.settings.loops, len(self._submaps)
         # round and round the same way ever more submaps hold the place: the nearest will do
-        most = min(settings.tries, keyframe.index - self.tried)
+        most = min(settings.tries, place.keyframe - self.tried)
         if count == 0 or most <= 0:
             return []
-        self._remember(count)
-        metres, radians = self.graph.deviations_from(keyframe.submap)
-        view_m = median_range(keyframe.clusters.points)
+        metres, radians = self.graph.deviations_from(place.submap)
         reach_m = np.minimum(settings.deviations * metres[:count], settings.max_reach * unit)
         nearest = self._nearest(here, view_m, reach_m, most)
         wide_m = WIDE_STEPS * unit
         if any(reach_m[k] > wide_m for k in nearest):
-            far_m = self.graph.far_deviations_from(keyframe.submap)[:count]
+            far_m = self.graph.far_deviations_from(place.submap)[:count]
             reach_m = np.minimum(reach_m, np.maximum(settings.deviations * far_m, wide_m))
             nearest = self._nearest(here, view_m, reach_m, most)
         return [
-            (self.local.submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
+            (self._submaps[k], float(reach_m[k]), settings.deviations * float(radians[k]))
             for k in nearest
         ]
 
@@ -144,21 +153,23 @@ class LoopCloser:
             most=most,
         )
 
-    def _remember(self, count: int) -> None:
+    def _remember(self, finished: Sequence[Submap]) -> None:
         """Keep where finished submaps were seen from, and when each may be tried."""
-        for submap in self.local.submaps[len(self._viewpoints) : count]:
+        for submap in finished:
+            self._submaps.append(submap)
             self._next_try = np.append(self._next_try, 0.0 if submap.keyframes else math.inf)
             self._viewpoints.add(submap)
 
     def _try(
         self,
-        keyframe: Keyframe,
+        place: Place,
         clusters: Sequence[Clusters],
         submap: Submap,
         window: Window,
-    ) -> None:
-        """Search, refine, judge; a closure from far off waits for a second that agrees."""
-        settings = self.local.settings
+        sigma_m: float,
+    ) -> Loop | None:
+        """Search, refine, judge."""
+        settings = self.settings
         unit, reach_m = settings.ladder[-1], window.reach_m
         self.tried += 1
         # the wider the search, the more submaps wait for theirs, and the longer a loop may take
@@ -172,18 +183,18 @@ class LoopCloser:
         floor = LEAST_WIDE_SCORE if reach_m > WIDE_STEPS * unit else LEAST_SCORE
         peak = search(likelihood, coarse.points, coarse.tangents, window, floor=floor)
         if peak is None:
-            return
+            return None
         result = register_down(
             submap.levels[-REFINED:],
             clusters[-REFINED:],
             peak.pose,
             peak.pose,
             isotropic_information((0.5 * DIRECT_STEPS * unit, 0.1)),
-            sigma_m=self.local.sigma_m,
+            sigma_m=sigma_m,
             settings=self._refining,
         )
-        if not self._good(result, unit) or result.inlier_ratio < KEPT * keyframe.explained:
-            return
+        if not self._good(result, unit) or result.inlier_ratio < KEPT * place.explained:
+            return None
         # most places fail above: where else the scan may be is asked of those that fit
         rival = search(
             likelihood,
@@ -195,30 +206,22 @@ class LoopCloser:
             apart_m=10.0 * unit,
         )
         if rival is not None:
-            return
-        loop = Loop(
-            submap.index,
-            keyframe.index,
-            SE2.from_array(result.pose),
-            match_information(result.information, unit),
-        )
-        if reach_m > 10.0 * unit:
-            self._confirm(loop, keyframe)
-        else:
-            self._accept(loop)
+            return None
         self._next_try[submap.index] = self._travelled_m + 3.0 * settings.loops.retry * unit
+        information = match_information(result.information, unit)
+        return Loop(submap.index, place.keyframe, SE2.from_array(result.pose), information)
 
     def _likelihood(self, submap: Submap, window: Window) -> Likelihood:
         """What a search in that window looks at; drawn anew where it is not of the last ones."""
         forgotten = _oldest(self._drawn, submap, DRAWN)
         if forgotten:
             forgotten.forget_likelihood()
-        cell_m = CELL_STEPS * self.local.settings.ladder[-1]
+        cell_m = CELL_STEPS * self.settings.ladder[-1]
         heights = max(LEAST_HEIGHTS, heights_for(math.ceil(window.reach_m / cell_m)))
         return submap.likelihood(cell_m=cell_m, heights=min(HEIGHTS, heights))
 
     def _good(self, result: RegistrationResult, unit_m: float) -> bool:
-        settings = self.local.settings.loops
+        settings = self.settings.loops
         return (
             result.points >= 10
             and result.inlier_ratio >= settings.min_inliers
@@ -227,35 +230,33 @@ class LoopCloser:
 
     def _accept(self, loop: Loop) -> None:
         self.loops.append(loop)
-        keyframe = self.local.keyframes[loop.keyframe]
-        submap = self.local.submaps[keyframe.submap]
-        pose_submap_submap = loop.pose_submap_base @ submap.to_submap(keyframe.pose_local).inverse()
-        expected = self.graph.pose(loop.submap).inverse() @ self.graph.pose(submap.index)
+        place = self._places[loop.keyframe]
+        pose_submap_submap = loop.pose_submap_base @ place.pose_submap_base.inverse()
+        expected = self.graph.pose(loop.submap).inverse() @ self.graph.pose(place.submap)
         gap = expected.inverse() @ pose_submap_submap
         self.graph.add_loop(
             loop.submap,
-            submap.index,
+            place.submap,
             pose_submap_submap,
             loop.information,
-            urgent=math.hypot(gap.x, gap.y) > URGENT_STEPS * self.local.settings.ladder[-1],
+            urgent=math.hypot(gap.x, gap.y) > URGENT_STEPS * self.settings.ladder[-1],
         )
 
-    def _confirm(self, loop: Loop, keyframe: Keyframe) -> None:
-        """Two closures agree when both ask for the same correction of the present place.
+    def _confirm(self, loop: Loop, view_m: float) -> None:
+        """A closure from far off waits for one that asks for the same correction of this place.
 
         That is evidence only where each could have asked for another one: both must know the
         place in all directions, and the second not see again what misled the first.
         """
-        unit = self.local.settings.ladder[-1]
+        unit = self.settings.ladder[-1]
         if _position_deviation(loop.information) > AGREED_STEPS * unit:
             return
         wanted = self.graph.pose(loop.submap) @ loop.pose_submap_base
-        view_m = median_range(keyframe.clusters.points)
         for other, other_wanted in self._doubtful:
             if other.keyframe == loop.keyframe:
                 continue
-            before = self.local.keyframes[other.keyframe].pose_local
-            tracked = before.inverse() @ keyframe.pose_local
+            before = self._places[other.keyframe].pose_local
+            tracked = before.inverse() @ self._places[loop.keyframe].pose_local
             asked = other_wanted.inverse() @ wanted
             gap = tracked.inverse() @ asked
             way = math.hypot(tracked.x, tracked.y)

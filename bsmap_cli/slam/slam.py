@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from array import array
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,10 +23,11 @@ from bsmap_cli.slam.keyframes import Keyframe
 from bsmap_cli.slam.known_map import KnownMap
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
+from bsmap_cli.slam.loop_tasks import LoopTask, LoopTasks
+from bsmap_cli.slam.loops_beside import CAN_FORK, LoopsBeside
 from bsmap_cli.slam.old_map import OldMap
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.slam_view import SlamView, view_of
-from bsmap_cli.slam.submap_graph import SubmapGraph
 from bsmap_cli.slam.tracked_map import tracked_levels
 
 
@@ -57,15 +59,22 @@ class Slam:
     """Feed scans to `process`, in the order of the log; `finish` closes the map.
 
     known : a map to go on with, of the degree and the finest knot step of the settings.
+    cores : with more than one, loops are looked for in a process beside this one, where that can
+    be: the result is the same, but `view` then does not know of them.
     """
 
-    def __init__(self, settings: SlamSettings, known: KnownMap | None = None) -> None:
+    def __init__(
+        self, settings: SlamSettings, known: KnownMap | None = None, *, cores: int = 1
+    ) -> None:
         self.settings = settings
         self._known = known
         self._log = ScanLog()
         self._front = FrontEnd(settings)
         self._local: LocalSlam | None = None
-        self._closer: LoopCloser | None = None
+        self._closer = LoopCloser(settings)
+        self._tasks: LoopTasks | None = None
+        self._beside: LoopsBeside | None = None
+        self._forks = cores > 1 and CAN_FORK
         self._lost: list[dict[str, int]] = []
         self._degenerate = 0
         self._was_lost = False
@@ -84,9 +93,9 @@ class Slam:
         started = time.perf_counter()
         step = self._local.last_step if self._local else (0.0, 0.0, 0.0)
         clusters = self._front.clusters(scan, step)
-        if self._local is None or self._closer is None:
+        if self._local is None:
             self._local = LocalSlam(settings, self._front.sigma_m)
-            self._closer = LoopCloser(self._local, SubmapGraph(self._local))
+            self._tasks = LoopTasks(self._local)
         local = self._local
         local.sigma_m = self._front.sigma_m
         segmented = time.perf_counter()
@@ -102,9 +111,16 @@ class Slam:
         self._note_loss(tracked.lost, scan.stamp_ns)
         if tracked.keyframe:
             self._look(scan, tracked.keyframe)
-        if tracked.keyframe and settings.loops.enabled and self._closer:
-            self._closer.process(tracked.keyframe)
+        if tracked.keyframe and settings.loops.enabled and self._tasks:
+            self._look_for_loops(self._tasks.task(tracked.keyframe))
             self.seconds["loops"] += time.perf_counter() - done
+
+    def _look_for_loops(self, task: LoopTask) -> None:
+        if self._forks and task.finished:  # the first that may be found again
+            self._forks = False
+            with suppress(OSError):
+                self._beside = LoopsBeside(self._closer)
+        (self._beside or self._closer).process(task)
 
     def _look(self, scan: Scan, keyframe: Keyframe) -> None:
         """Let the map fade where the keyframe looks through it, or remember that for the end."""
@@ -127,7 +143,7 @@ class Slam:
 
     def view(self) -> SlamView | None:
         """How the run stands; None before the first scan."""
-        if self._local is None or self._closer is None:
+        if self._local is None:
             return None
         pose_local = SE2.from_array(self._log.poses[-3:])
         return view_of(self._local, self._closer.graph.poses, pose_local)
@@ -140,12 +156,16 @@ class Slam:
         TrackingError : there is a map to go on with, and the log has no place in it.
         """
         local, closer, settings = self._local, self._closer, self.settings
-        if local is None or closer is None:
+        if local is None:
             empty = Trajectory(np.zeros(0, np.int64), np.zeros((0, 3)))
             return SlamResult(
                 MapDocument(degree=settings.degree, max_weight=1, levels=()), empty, {}
             )
         started = time.perf_counter()
+        if self._beside:
+            self._beside.finish()
+            self.seconds["loops"] += time.perf_counter() - started
+            started = time.perf_counter()
         known = self._known
         if known:
             poses, rejected = OldMap(known, local, closer.loops).solve()

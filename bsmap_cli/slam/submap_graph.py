@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from bsmap_cli.geometry.se2 import SE2, Points, Vector
 from bsmap_cli.slam.edges import EdgeList
-from bsmap_cli.slam.local_slam import LocalSlam
+from bsmap_cli.slam.loop_tasks import Link
 from bsmap_cli.slam.pose_graph import optimise
 from bsmap_cli.slam.surest_chains import SurestChains
 from bsmap_cli.slam.uncertainty import isotropic_information, way_deviation
@@ -23,10 +23,10 @@ class SubmapGraph:
     poses : (n, 3) of the submaps in the map frame, from the last optimisation on.
     """
 
-    def __init__(self, local: LocalSlam) -> None:
-        self._local = local
+    def __init__(self, finest_step_m: float) -> None:
         self.poses: Points = np.empty((0, 3))
-        self._match = way_deviation(0.0, local.settings.ladder[-1])
+        self._unit_m = finest_step_m
+        self._match = way_deviation(0.0, finest_step_m)
         self._chains = SurestChains((*self._match, 0.0))
         self._edges = EdgeList()
         self._loops = 0
@@ -40,37 +40,34 @@ class SubmapGraph:
         """Where a submap lies in the map frame."""
         return SE2.from_array(self.poses[submap])
 
-    def update(self) -> None:
+    def update(self, links: Sequence[Link]) -> None:
         """Take in submaps begun since, and optimise anew where loops were added.
 
         A closure that moves the map is taken in at once, others when the graph has grown: what
         they cost stays in proportion to what tracking costs.
         """
-        submaps = self._local.submaps
-        begun = len(self.poses) < len(submaps)
-        for k in range(len(self.poses), len(submaps)):
-            self._begin(k)
+        for link in links:
+            self._begin(link)
         size = len(self.poses) + self._loops
-        due = begun and self._pending and size >= GROWN * self._solved
-        if begun or self._urgent:
+        due = links and self._pending and size >= GROWN * self._solved
+        if links or self._urgent:
             self._told = None
         if due or self._urgent:
             # where nothing moved much, the sceptical kernel alone will do
-            still = STILL_STEPS * self._local.settings.ladder[-1]
+            still = STILL_STEPS * self._unit_m
             rounds = 6 if self._urgent else 1
             self.poses = optimise(self.poses, self._edges, rounds=rounds, tolerance_m=still).poses
             self._urgent, self._pending, self._solved = False, 0, size
 
-    def _begin(self, k: int) -> None:
-        """Put submap k where tracking from the one before leads."""
-        submaps = self._local.submaps
-        pose = submaps[k].pose_local
+    def _begin(self, link: Link) -> None:
+        """Put a submap where tracking from the one before leads."""
+        k, pose = len(self.poses), link.step
         if k:
-            step = submaps[k - 1].to_submap(pose)
-            deviation = self._link_deviation(k)
-            self._chains.begin((*deviation, deviation[0] - self._match[0]))
-            self._edges.add(k - 1, k, step.as_array(), isotropic_information(deviation), loop=False)
-            pose = self.pose(k - 1) @ step
+            metres, radians = link.deviation
+            self._chains.begin((metres, radians, metres - self._match[0]))
+            information = isotropic_information(link.deviation)
+            self._edges.add(k - 1, k, link.step.as_array(), information, loop=False)
+            pose = self.pose(k - 1) @ link.step
         else:
             self._chains.begin()
         self.poses = np.concatenate((self.poses, [pose.as_array()]))
@@ -115,22 +112,3 @@ class SubmapGraph:
         if self._told is None or self._told[0] != submap:
             self._told, self._far_m = (submap, self._chains.sums(submap)), None
         return self._told[1]
-
-    def _link_deviation(self, k: int) -> tuple[float, float]:
-        """What tracking may have lost between the beginnings of submaps k - 1 and k."""
-        local = self._local
-        before, behind = local.submaps[k - 1].keyframes, local.submaps[k].keyframes
-        # one begun with the last keyframe stays empty where tracking is lost next
-        begin = before[0] if before else behind[0] - 1
-        end = behind[0] + 1 if behind else before[-1] + 1
-        way = coasted_m = coasted_rad = 0.0
-        weak = False
-        for index in range(begin + 1, min(end, len(local.keyframes))):
-            frame = local.keyframes[index]
-            step = frame.pose_local.relative_to(local.keyframes[index - 1].pose_local)
-            way += math.hypot(step.x, step.y)
-            coasted_m += frame.coasted_m
-            coasted_rad += frame.coasted_rad
-            weak = weak or frame.weak
-        unit = local.settings.ladder[-1]
-        return way_deviation(way, unit, coasted_m=coasted_m, coasted_rad=coasted_rad, weak=weak)
