@@ -5,23 +5,20 @@ from __future__ import annotations
 import math
 
 from bsmap_cli.geometry.compiled import lean_part
-from bsmap_cli.geometry.kernels import polynomial_jet, span_polynomial
+from bsmap_cli.geometry.foot_points import span_jet
 from bsmap_cli.geometry.se2 import Points
 
 
 @lean_part
 def curve_jet(
-    points: Points, first: int, matrix: Points, u: float, polynomial: Points
+    points: Points, first: int, matrix: Points, u: float
 ) -> tuple[float, float, float, float]:
     """s(u) and ds/du: x, y, dx, dy; u = tau / Delta is clamped to the curve's domain.
 
-    points : (N, 2) control points, the first at lattice index `first`; polynomial : (d + 1, 2)
-    scratch.
+    points : (N, 2) control points, the first at lattice index `first`.
     """
     degree = matrix.shape[0] - 1
     local = u - (first + degree)
     span = min(max(math.floor(local), 0), len(points) - degree - 1)
-    span_polynomial(points, span, matrix, polynomial)
-    f = min(1.0, max(0.0, local - span))
-    x, y, dx, dy, _, _ = polynomial_jet(polynomial, f)
-    return x, y, dx, dy
+    jet = span_jet(points, span, matrix, min(1.0, max(0.0, local - span)))
+    return jet.x, jet.y, jet.dx, jet.dy

@@ -43,7 +43,6 @@ def _align(
     iterations: int,
 ) -> tuple[bool, float]:
     """Whether the curves overlap, and the offset [lattice units] to add to the scan curve's u."""
-    polynomial = np.empty((matrix.shape[0], 2))
     offset = 0.0
     for _ in range(iterations):
         low = max(map_support[0], support[0] + offset)
@@ -53,8 +52,8 @@ def _align(
         h = g = 0.0
         for j in range(samples):
             u = low + (high - low) * (j + 0.5) / samples
-            mx, my, _, _ = curve_jet(map_points, map_first, matrix, u, polynomial)
-            kx, ky, dx, dy = curve_jet(points, first, matrix, u - offset, polynomial)
+            mx, my, _, _ = curve_jet(map_points, map_first, matrix, u)
+            kx, ky, dx, dy = curve_jet(points, first, matrix, u - offset)
             h += dx * dx + dy * dy
             g += dx * (mx - kx) + dy * (my - ky)
         if h <= 0.0:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli.geometry.compiled import inlined, kernel, lean
-from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
+from bsmap_cli.geometry.foot_points import span_jet
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.near_pairs import sort_into_cells
 from bsmap_cli.geometry.se2 import Points, Vector
 from bsmap_cli.mapping.control_points import fit_control_points
@@ -30,21 +31,19 @@ JOIN_STEPS, JOIN_ASIDE, JOIN_COSINE = 1.0, 0.25, 0.94  # gap along, aside [knot 
 JOIN_SAMPLES, JOIN_TAIL, JOIN_PENALTY = 8, 8.0, 1e-6  # a knot step; knot steps before the seam
 
 
-@kernel
+@lean
 def sample_curve(
     level: LevelArrays, matrix: Points, curve: int, u: Vector, points: Points, tangents: Points
 ) -> None:
     """Points and unit tangents of a curve at the parameters u [lattice units]."""
     degree = matrix.shape[0] - 1
-    polynomial = np.empty((degree + 1, 2))
     base = level.first[curve] + degree
     for j in range(len(u)):
         span = min(max(math.floor(u[j]) - base, 0), level.count[curve] - degree - 1)
-        span_polynomial(level.points, level.offset[curve] + span, matrix, polynomial)
-        x, y, dx, dy, _, _ = polynomial_jet(polynomial, u[j] - base - span)
-        norm = magnitude(dx, dy) + 1e-300
-        points[j, 0], points[j, 1] = x, y
-        tangents[j, 0], tangents[j, 1] = dx / norm, dy / norm
+        jet = span_jet(level.points, level.offset[curve] + span, matrix, u[j] - base - span)
+        norm = magnitude(jet.dx, jet.dy) + 1e-300
+        points[j, 0], points[j, 1] = jet.x, jet.y
+        tangents[j, 0], tangents[j, 1] = jet.dx / norm, jet.dy / norm
 
 
 @lean

@@ -122,7 +122,7 @@ def _sum_equations(
     levers: Vector,
     weights: Vector,
 ) -> None:
-    polynomial, row = np.empty((matrix.shape[0], 2)), np.empty((2, 4))
+    row = np.empty((2, 4))
     row[0, 0] = row[1, 1] = 1.0
     row[0, 1] = row[1, 0] = 0.0
     for p in range(len(map_curves)):
@@ -139,8 +139,8 @@ def _sum_equations(
         cos, sin = math.cos(poses[p, 2]), math.sin(poses[p, 2])
         for j in range(count):
             u = low + (high - low) * (j + 0.5) / count
-            mx, my, _, _ = curve_jet(map_points, level.first[curve], matrix, u, polynomial)
-            kx, ky, dx, dy = curve_jet(scan_points, firsts[p], matrix, u - offsets[p], polynomial)
+            mx, my, _, _ = curve_jet(map_points, level.first[curve], matrix, u)
+            kx, ky, dx, dy = curve_jet(scan_points, firsts[p], matrix, u - offsets[p])
             qx, qy = cos * kx - sin * ky, sin * kx + cos * ky
             ex, ey = mx - qx - poses[p, 0], my - qy - poses[p, 1]
             row[0, 2], row[1, 2] = -qy, qx  # nabla_xi T

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bsmap_cli.geometry.compiled import kernel
-from bsmap_cli.geometry.kernels import magnitude, polynomial_jet, span_polynomial
+from bsmap_cli.geometry.compiled import kernel, lean
+from bsmap_cli.geometry.foot_points import span_jet
+from bsmap_cli.geometry.kernels import magnitude
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.curve_map import CurveMap
 
@@ -47,7 +48,7 @@ def sample_surfaces(curve_map: CurveMap, spacing_m: float) -> tuple[Points, Poin
     return points, directions
 
 
-@kernel
+@lean
 def _sample(
     control_points: Points,
     rows: NDArray[np.int64],
@@ -56,15 +57,13 @@ def _sample(
     points: Points,
     directions: Points,
 ) -> None:
-    polynomial = np.empty((matrix.shape[0], 2))
     n = 0
     for row in rows:
-        span_polynomial(control_points, row, matrix, polynomial)
         for k in range(per_span):
-            x, y, dx, dy, _, _ = polynomial_jet(polynomial, (k + 0.5) / per_span)
-            norm = magnitude(dx, dy) + 1e-300
-            points[n, 0], points[n, 1] = x, y
-            directions[n, 0], directions[n, 1] = dx / norm, dy / norm
+            jet = span_jet(control_points, row, matrix, (k + 0.5) / per_span)
+            norm = magnitude(jet.dx, jet.dy) + 1e-300
+            points[n, 0], points[n, 1] = jet.x, jet.y
+            directions[n, 0], directions[n, 1] = jet.dx / norm, jet.dy / norm
             n += 1
 
 
