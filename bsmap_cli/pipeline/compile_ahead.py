@@ -6,7 +6,6 @@ a folder of theirs compiles it, and writes into the file what was compiled.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from bsmap_cli.beside import usable_cores
 from bsmap_cli.pipeline.kernel_table import PACKAGE, kernel_table, named, numba_type
 
 MOST_HELPERS = 3  # more would be done before they have started
@@ -59,12 +59,6 @@ def _helpers() -> int:
     if not Path(sys.executable or "").name.startswith("python"):
         return 0  # another program that holds Python: it must not be started anew
     return min(usable_cores() - 1, MOST_HELPERS)
-
-
-def usable_cores() -> int:
-    """How many cores this process may run on."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _start_helper(folder: str, names: Sequence[str]) -> subprocess.Popen[bytes]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from bsmap_cli.errors import LogError
+from bsmap_cli.logs.read_ahead import scans_ahead
 from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.sensor.scan import Scan
 
@@ -56,11 +57,13 @@ class Silent:
 class Feed:
     """Draws the scans of a reader once; what it remembers does not grow with their number.
 
+    cores : with more than one, a process beside this one reads the log, where that can be.
     read_s : time that reading took [s]; sensor : what the first scan tells of the lidar.
     """
 
     reader: LogReader
     progress: Progress
+    cores: int = 1
     read_s: float = 0.0
     count: int = 0
     first_ns: int = 0
@@ -87,7 +90,7 @@ class Feed:
         fails, the scans before come first.
         """
         most = 1 if self.reader.is_stream else MOST_AHEAD
-        source = iter(self.reader.scans())
+        source = scans_ahead(self.reader) if self.cores > 1 else self.reader.scans()
         failure: Exception | None = None
         ended = False
         while not ended:

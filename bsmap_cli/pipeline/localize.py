@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from bsmap_cli.beside import usable_cores
 from bsmap_cli.config import Settings
 from bsmap_cli.errors import TrackingError
 from bsmap_cli.logs.reader import LogReader
@@ -41,7 +42,7 @@ def run_localize(
     """
     refuse_too_large(document)
     localizer = Localizer(document, settings)
-    feed = Feed(reader, progress or Silent())
+    feed = Feed(reader, progress or Silent(), usable_cores())
     for scan in feed:
         localizer.process(scan)
     found = localizer.finish()

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsmap_cli import __version__
+from bsmap_cli.beside import usable_cores
 from bsmap_cli.config import Settings, settings_as_dict
 from bsmap_cli.errors import ConfigError, LogError
 from bsmap_cli.evaluation.pose_arrays import transform_poses
@@ -21,7 +22,7 @@ from bsmap_cli.logs.reader import LogReader
 from bsmap_cli.mapping.map_document import MapDocument
 from bsmap_cli.mapping.mapper import Mapper
 from bsmap_cli.mapping.mapping_settings import MappingSettings
-from bsmap_cli.pipeline.compile_ahead import compile_for_slam, usable_cores
+from bsmap_cli.pipeline.compile_ahead import compile_for_slam
 from bsmap_cli.pipeline.feed import Feed, Onlooker, Progress, Silent
 from bsmap_cli.pipeline.memory_needed import refuse_too_large
 from bsmap_cli.sensor.pose_track import PoseTrack
@@ -64,7 +65,7 @@ def run_map(
     ------
     LogError : no scan could be used.
     """
-    feed = Feed(reader, progress or Silent())
+    feed = Feed(reader, progress or Silent(), usable_cores())
     mapper = Mapper(_settings_for(MappingSettings, settings))
     pose_of = _pose_source(poses)
     stamps_ns, used_poses = array("q"), array("d")  # 32 bytes a scan
@@ -120,7 +121,9 @@ def run_slam(
     UsageError : there is not memory enough for an old map so large.
     """
     progress = progress or Silent()
-    feed = Feed(reader, progress)
+    # who looks on wants to see closed loops at once, and has threads, beside which none should fork
+    cores = 1 if onlooker else usable_cores()
+    feed = Feed(reader, progress, cores)
     known = None
     if old is not None:
         if not settings.final_map.rebuild:
@@ -131,8 +134,6 @@ def run_slam(
         refuse_too_large(old)
         settings = settings_for_map(settings, old)
         known = KnownMap(old, _settings_for(SlamSettings, settings))
-    # who looks on wants to see closed loops at once, and has threads, beside which none should fork
-    cores = 1 if onlooker else usable_cores()
     slam = Slam(_settings_for(SlamSettings, settings), known, cores=cores)
     scans = iter(feed)
     first = next(scans)  # what is wrong with the log is told before anything is compiled

@@ -1,21 +1,16 @@
 """Look for loops in a second process while tracking goes on: the same loops, sooner.
 
 Tracking asks for no loop before the log has ended, so that it does not matter when one is found.
-The search is half Python, which runs one thread at a time: hence a process. It is forked, with all
-that is loaded and compiled; other systems than Linux cannot promise that this is safe.
 """
 
 from __future__ import annotations
 
 import io
 import pickle
-import signal
-import sys
-import warnings
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
+from bsmap_cli.beside import Beside
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.loop_tasks import LoopTask
@@ -23,8 +18,6 @@ from bsmap_cli.slam.slam_settings import SlamSettings
 
 BATCH = 16  # tasks that are handed on at a time
 END = b""
-HEARD = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
-CAN_FORK = sys.platform == "linux"
 
 
 class LoopsBeside:
@@ -39,61 +32,34 @@ class LoopsBeside:
         self._closer = closer
         self._tasks: list[LoopTask] = []
         self._packer = _Packer(closer.settings)
-        context = get_context("fork")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(
-            target=_work, args=(theirs, self._pipe, closer), daemon=True
-        )
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, HEARD)
-        try:
-            with warnings.catch_warnings():
-                # threads that numpy or a progress bar have started hold nothing a search needs
-                warnings.simplefilter("ignore", DeprecationWarning)
-                self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-            theirs.close()
+        self._other = Beside(_work, closer)
 
     def process(self, task: LoopTask) -> None:
         """Hand on the task of one keyframe; waits where the other process is far behind."""
         self._tasks.append(task)
         if len(self._tasks) % BATCH == 0:
-            self._send(self._packer.pack(self._tasks[-BATCH:]))
+            self._other.send(self._packer.pack(self._tasks[-BATCH:]))
 
     def finish(self) -> None:
         """Wait for all loops; the closer then knows them."""
         closer, left = self._closer, len(self._tasks) % BATCH
-        self._send(self._packer.pack(self._tasks[-left:] if left else []))
-        self._send(END)
+        self._other.send(self._packer.pack(self._tasks[-left:] if left else []))
+        self._other.send(END)
         try:
-            closer.loops, closer.tried = self._pipe.recv()
+            closer.loops, closer.tried = self._other.pipe.recv()
         except (OSError, EOFError):
             for task in self._tasks:
                 closer.process(task)
-        self._pipe.close()
-        self._process.join()
-
-    def _send(self, message: bytes | memoryview) -> None:
-        try:
-            self._pipe.send_bytes(message)
-        except OSError:  # it has ended, which is seen when its answer is read
-            return
+        self._other.end()
 
 
-def _work(pipe: Connection, of_the_other: Connection, closer: LoopCloser) -> None:
-    """Do what comes through the pipe, and tell in the end; without a word where that fails."""
-    of_the_other.close()  # or its end would never be seen
-    for number in HEARD:  # Ctrl-C is for the other process, which ends this one
-        signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, HEARD)
+def _work(pipe: Connection, closer: LoopCloser) -> None:
+    """Do what comes through the pipe, and tell in the end."""
     unpack = _Unpacker(closer.settings).unpack
-    try:
-        while (message := pipe.recv_bytes()) != END:
-            for task in unpack(message):
-                closer.process(task)
-        pipe.send((closer.loops, closer.tried))
-    except Exception:  # the other process comes to the same point, and says what is wrong there
-        return
+    while (message := pipe.recv_bytes()) != END:
+        for task in unpack(message):
+            closer.process(task)
+    pipe.send((closer.loops, closer.tried))
 
 
 class _Packer:

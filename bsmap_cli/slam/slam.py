@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bsmap_cli.beside import CAN_FORK
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.map_document import MapDocument
@@ -24,7 +25,7 @@ from bsmap_cli.slam.known_map import KnownMap
 from bsmap_cli.slam.local_slam import LocalSlam
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.loop_tasks import LoopTask, LoopTasks
-from bsmap_cli.slam.loops_beside import CAN_FORK, LoopsBeside
+from bsmap_cli.slam.loops_beside import LoopsBeside
 from bsmap_cli.slam.old_map import OldMap
 from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.slam_view import SlamView, view_of

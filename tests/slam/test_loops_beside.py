@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from bsmap_cli.beside import CAN_FORK
 from bsmap_cli.logs.open_log import open_log
 from bsmap_cli.logs.reader import ReadOptions
-from bsmap_cli.slam import loops_beside
 from bsmap_cli.slam.loop_closure import LoopCloser
 from bsmap_cli.slam.slam import Slam
 from bsmap_cli.slam.slam_settings import SlamSettings
 
 RING = Path(__file__).parents[2] / "sample_logs" / "loop.csv.gz"
 
-pytestmark = pytest.mark.skipif(not loops_beside.CAN_FORK, reason="no process is forked here")
+pytestmark = pytest.mark.skipif(not CAN_FORK, reason="no process is forked here")
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_the_same_to_the_byte(scans, alone):
 
 def test_the_same_where_the_other_process_is_killed(scans, alone):
     slam = tracked(scans[: len(scans) // 2], cores=2)
-    os.kill(slam._beside._process.pid, signal.SIGKILL)
+    os.kill(slam._beside._other.process.pid, signal.SIGKILL)
     for scan in scans[len(scans) // 2 :]:
         slam.process(scan)
     assert results(slam) == alone
@@ -78,20 +78,3 @@ def test_what_goes_wrong_there_is_told_here(scans, monkeypatch, capfd):
     with pytest.raises(ZeroDivisionError, match="of no use"):
         slam.finish()
     assert capfd.readouterr() == ("", "")
-
-
-def test_the_other_process_ends_when_nobody_wants_to_know(scans):
-    slam = tracked(scans[: len(scans) // 2], cores=2)
-    process = slam._beside._process
-    slam._beside._pipe.close()  # as where this process is killed
-    process.join(timeout=20.0)
-    assert process.exitcode == 0
-
-
-def test_ctrl_c_is_not_for_the_other_process(scans, alone):
-    slam = tracked(scans[: len(scans) // 2], cores=2)
-    os.kill(slam._beside._process.pid, signal.SIGINT)
-    for scan in scans[len(scans) // 2 :]:
-        slam.process(scan)
-    slam._beside._send(loops_beside.END)
-    assert slam._beside._pipe.poll(20.0)  # it still answers
