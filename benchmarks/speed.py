@@ -4,7 +4,8 @@ python benchmarks/speed.py [LOG...] [--peers-python VENV/bin/python] [--runs 3] 
 
 Simulated logs of 181, 361 and 1,081 beams, and logs of your own; one and three levels, with and
 without loop closure. Each run has a process of its own on one core (where the system lets a
-process choose), the first is not counted, and medians are printed: a report, not a test.
+process choose; one row has all cores, as a user has), the first is not counted, and medians are
+printed: a report, not a test.
 The peers (pip install kiss-icp small_gicp, best into an environment of their own) only track:
 they are fed with the points of the same scans, made beforehand, and odometry as a guess.
 """
@@ -40,8 +41,10 @@ from bsmap_cli.sensor.trajectory import Trajectory
 
 HERE = Path(__file__).parent
 LIDARS = ("lms200", "lms200half", "ust10lx")
+ALL_CORES = "3 levels, all cores"
 CONFIGURATIONS: dict[str, tuple[str, ...]] = {
     "3 levels": (),
+    ALL_CORES: (),
     "3 levels, no loops": ("loops.enabled=false",),
     "1 level": ("ladder=[0.1]",),
     "1 level, no loops": ("ladder=[0.1]", "loops.enabled=false"),
@@ -53,9 +56,9 @@ ENVIRONMENT = dict.fromkeys(
 )
 
 
-def on_one_core(command: list[str]) -> dict[str, Any]:
-    """What a child process prints as JSON; it runs on one core where the system can say so."""
-    setaffinity = getattr(os, "sched_setaffinity", None)
+def measured(command: list[str], *, on_one_core: bool) -> dict[str, Any]:
+    """What a child process prints as JSON; on one core where the system can say so."""
+    setaffinity = getattr(os, "sched_setaffinity", None) if on_one_core else None
     core = max(os.sched_getaffinity(0)) if setaffinity else 0
     done = subprocess.run(
         command,
@@ -79,7 +82,8 @@ def measured_in_turn(commands: dict[str, list[str]], runs: int) -> dict[str, dic
     for _ in range(runs + 1):
         for name in list(reports):
             try:
-                reports[name].append(on_one_core(commands[name]))
+                one = measured(commands[name], on_one_core=name != ALL_CORES)
+                reports[name].append(one)
             except (OSError, subprocess.CalledProcessError):
                 print(f"  {name} does not run: {' '.join(commands[name])}", file=sys.stderr)
                 del reports[name]

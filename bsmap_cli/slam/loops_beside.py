@@ -10,6 +10,9 @@ import pickle
 from multiprocessing.connection import Connection
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bsmap_cli.beside import Beside
 from bsmap_cli.mapping.compact_clusters import CompactClusters
 from bsmap_cli.slam.loop_closure import LoopCloser
@@ -84,6 +87,17 @@ class _Pickler(pickle.Pickler):
 
     def persistent_id(self, part: Any) -> int | None:
         return self.numbers.get(id(part))
+
+    def reducer_override(self, part: Any) -> Any:
+        """An array as its bytes: numpy's own way takes three times as long."""
+        if type(part) is np.ndarray:
+            return _array, (part.tobytes(), part.dtype.char, part.shape)
+        return NotImplemented
+
+
+def _array(data: bytes, kind: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Kernels are compiled for arrays that can be written."""
+    return np.frombuffer(bytearray(data), kind).reshape(shape)
 
 
 class _Unpacker:
