@@ -17,6 +17,9 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 CAN_FORK = sys.platform == "linux"
 HEARD = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 
@@ -63,6 +66,33 @@ class Beside:
         self.pipe.close()
         self.process.terminate()
         self.process.join()
+
+
+def halves(work: Callable[[int, int], NDArray[Any]], count: int) -> NDArray[Any]:
+    """`work(0, count)`: rows for so many things, half of them made in a process beside this one.
+
+    Where that one comes to grief, or there is none to be had, all of them are made here.
+    """
+    middle = count // 2
+    try:
+        other = Beside(_send_rows, work, middle, count)
+    except OSError:
+        return work(0, count)
+    try:
+        rows = [work(0, middle)]
+        try:
+            rows.append(other.pipe.recv())
+        except (OSError, EOFError):
+            rows.append(work(middle, count))
+        return np.concatenate(rows)
+    finally:
+        other.end()
+
+
+def _send_rows(
+    pipe: Connection, work: Callable[[int, int], NDArray[Any]], begin: int, end: int
+) -> None:
+    pipe.send(work(begin, end))
 
 
 def _run(

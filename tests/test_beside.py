@@ -3,9 +3,10 @@
 import os
 import signal
 
+import numpy as np
 import pytest
 
-from bsmap_cli.beside import CAN_FORK, Beside
+from bsmap_cli.beside import CAN_FORK, Beside, halves
 
 pytestmark = pytest.mark.skipif(not CAN_FORK, reason="no process is forked here")
 
@@ -55,3 +56,30 @@ def test_signals_are_heard_again_after_the_fork():
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     Beside(echo, 1).end()
     assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == before
+
+
+def test_rows_are_made_by_two():
+    def rows(begin, end):
+        return np.array([(k, os.getpid()) for k in range(begin, end)])
+
+    made = halves(rows, 7)
+    assert made[:, 0].tolist() == list(range(7))
+    assert len(set(made[:, 1].tolist())) == 2
+
+
+def test_rows_that_nobody_else_could_make_are_made_here():
+    here = os.getpid()
+
+    def rows(begin, end):
+        assert os.getpid() == here
+        return np.arange(begin, end)
+
+    assert halves(rows, 7).tolist() == list(range(7))
+
+
+def test_all_rows_are_made_here_where_there_is_no_process(monkeypatch):
+    def fork():
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(os, "fork", fork)
+    assert halves(np.arange, 7).tolist() == list(range(7))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bsmap_cli.beside import CAN_FORK, halves
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.compact_clusters import unpacked_scans
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 FEW_KEYFRAMES = 20  # a log with fewer has no views to spare
+WORTH_SHARING = 500  # keyframes: fewer are registered sooner than a process is begun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,28 +83,36 @@ def refine_poses(
     keyframes: list[Keyframe],
     settings: SlamSettings,
     sigma_m: float,
+    *,
+    cores: int = 1,
 ) -> Points:
     """Register every keyframe against the whole map, held softly to where the graph put it."""
-    refined = poses.copy()
     ladder = tuple(level.knot_step_m for level in levels)
     prior = isotropic_information((0.3 * ladder[-1], 0.02))
-    packed = [keyframe.clusters for keyframe in keyframes]
-    scans = unpacked_scans(packed, settings.ladder[-1], sigma_m)
-    for k, finest in enumerate(scans):
-        clusters = ScanLevels(finest, ladder, settings.fitting, sigma_m)
-        result = register_near(
-            levels,
-            clusters,
-            poses[k],
-            poses[k],
-            prior,
-            enough=settings.registration.shortcut,
-            sigma_m=sigma_m,
-            settings=settings.registration,
-        )
-        if result.inlier_ratio >= settings.recovery.search_below:
-            refined[k] = result.pose
-    return refined
+
+    def refined(begin: int, end: int) -> Points:
+        found = poses[begin:end].copy()
+        packed = [keyframe.clusters for keyframe in keyframes[begin:end]]
+        for finest, pose in zip(
+            unpacked_scans(packed, settings.ladder[-1], sigma_m), found, strict=True
+        ):
+            result = register_near(
+                levels,
+                ScanLevels(finest, ladder, settings.fitting, sigma_m),
+                pose.copy(),
+                pose.copy(),
+                prior,
+                enough=settings.registration.shortcut,
+                sigma_m=sigma_m,
+                settings=settings.registration,
+            )
+            if result.inlier_ratio >= settings.recovery.search_below:
+                pose[:] = result.pose
+        return found
+
+    if cores > 1 and CAN_FORK and len(keyframes) >= WORTH_SHARING:
+        return halves(refined, len(keyframes))
+    return refined(0, len(keyframes))
 
 
 def final_map(
@@ -111,17 +121,20 @@ def final_map(
     settings: SlamSettings,
     sigma_m: float,
     old: Sequence[MapLevel] = (),
+    *,
+    cores: int = 1,
 ) -> tuple[Points, list[CurveMap]]:
     """Refined poses and the levels of the finished map.
 
     old : a map that is gone on with, in the frame of the poses: a level for each knot step.
+    cores : with more than one, half of the keyframes are registered in a process beside this one.
     """
     for turn in range(settings.final_map.rounds):
         # once all poses agree with one map, none needs to be drawn in from farther off
         ladder = settings.ladder[-(settings.final_map.levels if turn == 0 else 1) :]
         before = old[-len(ladder) :]
         levels = build_map(poses, keyframes, ladder, settings, sigma_m, before, sparse=True)
-        poses = refine_poses(poses, levels, keyframes, settings, sigma_m)
+        poses = refine_poses(poses, levels, keyframes, settings, sigma_m, cores=cores)
     written = settings.ladder if settings.final_map.all_levels else settings.ladder[-1:]
     before = old[-len(written) :]
     drawn = settings.without_faint()

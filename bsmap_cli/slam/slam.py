@@ -75,6 +75,7 @@ class Slam:
         self._closer = LoopCloser(settings)
         self._tasks: LoopTasks | None = None
         self._beside: LoopsBeside | None = None
+        self._cores = cores
         self._forks = cores > 1 and CAN_FORK
         self._lost: list[dict[str, int]] = []
         self._degenerate = 0
@@ -176,7 +177,9 @@ class Slam:
         cap = settings.merging.max_weight
         if settings.final_map.rebuild:
             old = known.frozen if known else ()
-            poses, maps = final_map(poses, local.keyframes, settings, local.sigma_m, old)
+            poses, maps = final_map(
+                poses, local.keyframes, settings, local.sigma_m, old, cores=self._cores
+            )
             levels = tuple(freeze_level(level, max_weight=cap) for level in maps)
         else:
             levels = tracked_levels(local.submaps, local.keyframes, poses, settings, local.sigma_m)
