@@ -12,7 +12,6 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-import fresh_kernels  # noqa: F401  (before numba)
 from cases import Case, logs_in, recorded_case, simulated_case
 from judging import Judged, judge
 from pages import markdown, write_table

@@ -16,7 +16,6 @@ from fnmatch import fnmatch
 from functools import partial
 from pathlib import Path
 
-import fresh_kernels  # noqa: F401  (before numba)
 from cases import LIDARS, LONG, SCENES, Case, logs_in, recorded_case, simulated_cases
 from judging import Judged, judge
 

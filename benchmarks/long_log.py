@@ -17,7 +17,6 @@ import tempfile
 from pathlib import Path
 from time import process_time
 
-import fresh_kernels  # noqa: F401  (before numba)
 from judging import trajectory_figure
 from measured_run import WARM_UP, measured
 

@@ -14,8 +14,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import fresh_kernels  # noqa: F401  (before numba)
-
 from bsmap_cli.cli.door import collect_seldom
 from bsmap_cli.config import Settings, load_settings
 from bsmap_cli.exchange.tum import write_tum

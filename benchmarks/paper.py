@@ -12,7 +12,6 @@ import argparse
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-import fresh_kernels  # noqa: F401  (before numba)
 from pages import length, markdown, write_table
 from paper_basins import Basin, basins
 from paper_figures import draw_errors, draw_missions, draw_shapes

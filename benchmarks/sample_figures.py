@@ -9,7 +9,6 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-import fresh_kernels  # noqa: F401  (before numba)
 import numpy as np
 from pages import length, markdown, write_table
 

@@ -23,7 +23,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import fresh_kernels  # noqa: F401  (before numba)
 import numpy as np
 import startup
 from cases import recorded_case

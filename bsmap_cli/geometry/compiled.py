@@ -10,12 +10,17 @@ compiled without counting (`inlined`, `lean`, `lean_part`) and must not allocate
 What only compiled code calls (`inlined`, `part`, `lean_part`) is compiled without the code by
 which Python would call it: for a map level that code is longer than most loops. Called from
 Python, such a function runs as it is written, slowly. It is not kept on disk by itself: what calls
-it holds it.
+it holds it. What is kept on disk is therefore good for one state of all sources (`_sources`):
+numba by itself asks after the file of the kernel alone, and would run old parts after an upgrade.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit, types
@@ -33,6 +38,9 @@ _RULES = {
     "fastmath": {"contract"},
     "no_cfunc_wrapper": True,
 }
+
+ROOMS = ("geometry", "sensor", "mapping", "slam")
+"""Where kernels are, and the records and constants that are compiled into them."""
 
 _OF_KERNELS, _OF_PARTS = quick_compilers()
 
@@ -67,7 +75,24 @@ def inlined(function: Function) -> Function:
 
 def _compile(function: Function, **options: Any) -> Function:
     rules: dict[str, Any] = {**_RULES, "pipeline_class": _OF_KERNELS, **options}
-    return cast(Function, njit(**rules)(function))
+    compiled = njit(**rules)(function)
+    if rules["cache"]:
+        with suppress(AttributeError):  # a numba that keeps its files otherwise
+            file = compiled._cache._cache_file
+            file._source_stamp = file._source_stamp, _sources()
+    return cast(Function, compiled)
+
+
+@cache
+def _sources() -> str:
+    """A digest of all that kernels are made of."""
+    package = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for room in ROOMS:
+        for path in sorted((package / room).rglob("*.py")):
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def _compile_part(function: Function, **options: bool) -> Function:

@@ -80,8 +80,8 @@ def foot_point(
     """The point of a curve nearest to (px, py) by Newton, from span `row` at f with its jet.
 
     It ends after so many steps, or where (px, py) is no more than `near_m` along the curve from it.
-    The search may walk over the spans `first_row` .. `last_row` of the curve and ends inside them.
-    Two steps from within half a span leave a tangential residual far below the noise.
+    The search, begun in the spans `first_row` .. `last_row` of the curve, stays inside them. Two
+    steps from within half a span leave a tangential residual far below the noise, or `near_m`.
     """
     for _ in range(steps):
         ex, ey = px - jet.x, py - jet.y

@@ -8,7 +8,7 @@ from bsmap_cli.geometry.compiled import inlined, part
 from bsmap_cli.geometry.kernels import symmetric_eigen3
 from bsmap_cli.geometry.se2 import Points, Vector
 
-SURE = 3.0  # deviations of a normal's noise; what a point tells beyond them is no noise
+DEVIATIONS = 3.0  # of a normal's noise; what a point tells beyond them is no noise
 FACING = 0.25  # cos² of 60 degrees: a normal farther off may be a bent end of another wall
 
 
@@ -20,7 +20,9 @@ def _certain(jacobian: Points, x: float, y: float, turn: float) -> float:
         weight = jacobian[j, 3]
         if weight > 0.0:
             along = jacobian[j, 0] * x + jacobian[j, 1] * y + jacobian[j, 2] * turn
-            total += weight * max(0.0, along * along - max(FACING, SURE * SURE * jacobian[j, 4]))
+            total += weight * max(
+                0.0, along * along - max(FACING, DEVIATIONS * DEVIATIONS * jacobian[j, 4])
+            )
     return total
 
 

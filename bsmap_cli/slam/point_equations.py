@@ -21,11 +21,12 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.span_index import nearest_span
 
 # Variance of a curve's tangent, per variance of a point over Delta^2 and weight. A thin curve is
-# not taken for worse than THIN, nor one seen often for surer than SURE: scans of a wall err alike,
+# not taken for worse than THIN, nor one seen often for surer than OFTEN: scans of a wall err alike,
 # by the poses they were laid at and by what the lidar does there.
-TANGENT_NOISE, THIN, SURE = 0.2, 0.1, 1.0
+TANGENT_NOISE, THIN, OFTEN = 0.2, 0.1, 1.0
 CONTACT = 6  # foot point x, y [m], unit tangent there, curvature [1/m], variance of the normal
 NEWTON_STEPS = 2  # from within half a span or a step along the curve
+NEAR = 0.25  # so far the pose may move before foot points are found anew [knot steps]
 ON_CIRCLE = 0.1  # so near to its foot point a point is led there by the circle [knot steps]
 
 
@@ -45,8 +46,8 @@ def touch(
 ) -> None:
     """Find where each point touches the map at this pose; its row becomes -1 if nowhere.
 
-    A point goes on from where it was found last; a new one from its neighbour's foot point, and the
-    index is asked only where that curve is not plainly the right one.
+    A point goes on from where it was found last; a new one from its neighbour's foot point. Where
+    that curve is not plainly the right one, the index is asked.
 
     contacts : (n, CONTACT) foot points and the circle that the curve follows there.
     """
@@ -68,7 +69,7 @@ def touch(
         found, asked = False, False
         while not found:
             if row < 0:
-                if known or asked:
+                if asked:
                     break
                 row, f = nearest_span(level, knot_step_m, px, py, tx, ty, gate_m, MIN_COSINE)
                 if row < 0:
@@ -103,11 +104,12 @@ def touch(
                 row = -1
                 continue
             bend = (ux * jet.ddy - uy * jet.ddx) * inverse * inverse
-            # at an end the curve goes on straight; near the middle of the circle no foot is near
-            inside = 0.0 < f < 1.0 and bend * beside < 0.5
+            # at an end the curve goes on straight; a point may not come past the circle's middle
+            ends = (row == first_row and f <= 0.0) or (row == last_row and f >= 1.0)
+            inside = not ends and bend * beside + abs(bend) * NEAR * knot_step_m < 1.0
             contacts[j, 0], contacts[j, 1], contacts[j, 2], contacts[j, 3] = jet.x, jet.y, ux, uy
             contacts[j, 4] = bend if inside else 0.0
-            contacts[j, 5] = tilt / min(max(level.weights[row + 1], THIN), SURE)
+            contacts[j, 5] = tilt / min(max(level.weights[row + 1], THIN), OFTEN)
             places[j] = f
         rows[j] = row
 

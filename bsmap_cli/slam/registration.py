@@ -21,11 +21,10 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
-from bsmap_cli.slam.point_equations import CONTACT, accumulate, touch
+from bsmap_cli.slam.point_equations import CONTACT, NEAR, accumulate, touch
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; a quarter of it is left
-NEAR = 0.25  # so far a curve is like its circle; then foot points are found anew [knot steps]
 SETTLED = 0.05  # found anew where the iteration would end after a longer way [knot steps]
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 
@@ -66,7 +65,7 @@ class RegistrationSettings:
     certain: float = setting(
         0.05,
         "while tracking it is observed, too, when points that no such noise explains give it so "
-        "many times that",
+        "many times that bound",
         minimum=0.0,
     )
 
@@ -142,9 +141,9 @@ def gauss_newton(
     start = pose.copy()
     found = 0
     steps = 0
-    moved, near = math.inf, NEAR
+    moved, still = math.inf, False
     for _ in range(gates.iterations):
-        if moved > near * knot_step_m:
+        if moved > (SETTLED if still else NEAR) * knot_step_m:
             touch(
                 level,
                 matrix,
@@ -195,7 +194,6 @@ def gauss_newton(
         still = step_m < STILL * knot_step_m
         if still and moved <= SETTLED * knot_step_m:
             break
-        near = SETTLED if still else NEAR
     return steps, found
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bsmap_cli.geometry.se2 import SE2
-from bsmap_cli.slam.point_equations import CONTACT, SURE, accumulate, touch
-from bsmap_cli.slam.registration import NEAR, STILL
+from bsmap_cli.slam.point_equations import CONTACT, NEAR, OFTEN, accumulate, touch
+from bsmap_cli.slam.registration import STILL
 from tests.slam.rooms import CENTRE, PILLAR, RADIUS, map_of, room_parts, seen_from
 
 STEP = 0.1
@@ -136,7 +136,7 @@ def test_a_wall_seen_often_has_no_surer_tangents():
     for times in (20, 60):
         curve_map = map_of(room_parts(), STEP, times)
         rows, contacts = touched(curve_map, clusters, CENTRE)
-        assert np.median(curve_map.arrays.weights[rows[rows >= 0] + 1]) > 2.0 * SURE
+        assert np.median(curve_map.arrays.weights[rows[rows >= 0] + 1]) > 2.0 * OFTEN
         tilts.append(np.median(contacts[rows >= 0, 5]))
     assert tilts[0] == tilts[1]
 

@@ -235,3 +235,49 @@ def test_near_the_place_the_finest_level_is_asked_first_and_a_lone_one_once(
     )
     assert len(calls) == asked
     assert result.inlier_ratio > 0.98
+
+
+def in_pieces(parts, random):
+    """The parts in stretches of 0.2 to 0.8 m, which become curves of their own."""
+    pieces = []
+    for part in parts:
+        begin = 0
+        while len(part) - begin >= 10:
+            end = begin + int(random.integers(10, 40))
+            pieces.append(part[begin:end])
+            begin = end
+    return pieces
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_told_of_a_match_is_true_at_the_pose_that_is_told(seed):
+    """Points leave their curves on the way, and are looked for on the next ones."""
+    random = np.random.default_rng(seed)
+    pieces = in_pieces(room_parts(), random)
+    curve_map = map_of([piece for piece in pieces if len(piece) >= 10])
+    noisy = [part + random.normal(0.0, 0.005, part.shape) for part in room_parts()]
+    clusters = seen_from(CENTRE, noisy, sigma_m=0.005)
+    off = random.uniform(-1.0, 1.0, 3) * (0.06, 0.06, 0.015)
+    found = run(curve_map, clusters, CENTRE.as_array() + off)
+    judged = run(curve_map, clusters, found.pose, iterations=1)
+    assert found.inlier_ratio == pytest.approx(judged.inlier_ratio, abs=0.005)
+    assert np.diag(found.information) == pytest.approx(np.diag(judged.information), rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("waves_m", [0.005, 0.01])
+def test_waves_that_were_seen_often_do_not_make_a_corridor_known(waves_m, seed):
+    """The map's walls are wavy, as poses and lidar made them; the scan's are straight."""
+    random = np.random.default_rng(seed)
+    parts = corridor_parts()
+    waves = [np.convolve(random.normal(size=430), np.hanning(31), "same")[:401] for _ in parts]
+    waves = [waves_m * wave / wave.std() for wave in waves]
+    curve_map = map_of([])
+    for _ in range(20):
+        wavy = [part + np.outer(wave, (0, 1)) for part, wave in zip(parts, waves, strict=True)]
+        insert(curve_map, *(part + random.normal(0.0, 0.005, part.shape) for part in wavy))
+    straight = [part[100:300] + random.normal(0.0, 0.005, (200, 2)) for part in parts]
+    start = (0.05, 1.01, 0.001)
+    result = run(curve_map, seen_from(SE2(0.0, 1.0, 0.0), straight, sigma_m=0.01), start)
+    assert result.degenerate == 1
+    assert result.pose[0] == pytest.approx(0.05, abs=2e-3)
