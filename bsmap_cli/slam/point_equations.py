@@ -26,7 +26,6 @@ from bsmap_cli.mapping.span_index import nearest_span
 TANGENT_NOISE, THIN, OFTEN = 0.2, 0.1, 1.0
 CONTACT = 6  # foot point x, y [m], unit tangent there, curvature [1/m], variance of the normal
 NEWTON_STEPS = 2  # from within half a span or a step along the curve
-NEAR = 0.25  # so far the pose may move before foot points are found anew [knot steps]
 ON_CIRCLE = 0.1  # so near to its foot point a point is led there by the circle [knot steps]
 
 
@@ -104,9 +103,8 @@ def touch(
                 row = -1
                 continue
             bend = (ux * jet.ddy - uy * jet.ddx) * inverse * inverse
-            # at an end the curve goes on straight; a point may not come past the circle's middle
-            ends = (row == first_row and f <= 0.0) or (row == last_row and f >= 1.0)
-            inside = not ends and bend * beside + abs(bend) * NEAR * knot_step_m < 1.0
+            # at an end the curve goes on straight; near the middle of the circle no foot is near
+            inside = 0.0 < f < 1.0 and bend * beside < 0.5
             contacts[j, 0], contacts[j, 1], contacts[j, 2], contacts[j, 3] = jet.x, jet.y, ux, uy
             contacts[j, 4] = bend if inside else 0.0
             contacts[j, 5] = tilt / min(max(level.weights[row + 1], THIN), OFTEN)

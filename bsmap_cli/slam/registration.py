@@ -21,10 +21,11 @@ from bsmap_cli.mapping.level_arrays import LevelArrays
 from bsmap_cli.mapping.segmentation import Clusters
 from bsmap_cli.settings import setting
 from bsmap_cli.slam.degeneracy import keep_unobserved
-from bsmap_cli.slam.point_equations import CONTACT, NEAR, accumulate, touch
+from bsmap_cli.slam.point_equations import CONTACT, accumulate, touch
 
 SHARED = 10.0  # neighbouring points err alike: so many count as one against the prior
 STILL = 5e-3  # a smaller step ends the iteration [knot steps]; a quarter of it is left
+NEAR = 0.25  # so far the pose may move before foot points are found anew [knot steps]
 SETTLED = 0.05  # found anew where the iteration would end after a longer way [knot steps]
 MODEL_ERROR = 0.05  # what a curve cannot follow, as a share of its knot step
 

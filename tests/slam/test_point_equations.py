@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bsmap_cli.geometry.se2 import SE2
-from bsmap_cli.slam.point_equations import CONTACT, NEAR, OFTEN, accumulate, touch
-from bsmap_cli.slam.registration import STILL
+from bsmap_cli.slam.point_equations import CONTACT, OFTEN, accumulate, touch
+from bsmap_cli.slam.registration import NEAR, STILL
 from tests.slam.rooms import CENTRE, PILLAR, RADIUS, map_of, room_parts, seen_from
 
 STEP = 0.1
