@@ -31,6 +31,8 @@ from bsmap_cli.slam.slam_settings import SlamSettings
 from bsmap_cli.slam.slam_view import SlamView, view_of
 from bsmap_cli.slam.tracked_map import tracked_levels
 
+TRIES_HERE = 16  # to close a loop: then all that a second process needs is loaded, and of use
+
 
 @dataclass(frozen=True, slots=True)
 class SlamResult:
@@ -118,7 +120,7 @@ class Slam:
             self.seconds["loops"] += time.perf_counter() - done
 
     def _look_for_loops(self, task: LoopTask) -> None:
-        if self._forks and task.finished:  # the first that may be found again
+        if self._forks and self._closer.tried >= TRIES_HERE:
             self._forks = False
             with suppress(OSError):
                 self._beside = LoopsBeside(self._closer)
