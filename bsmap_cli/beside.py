@@ -41,6 +41,8 @@ class Beside:
     """
 
     def __init__(self, work: Callable[..., None], *arguments: Any) -> None:
+        if not CAN_FORK:
+            raise OSError("a process cannot be forked safely here")
         context = get_context("fork")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(
@@ -96,7 +98,10 @@ def _send_rows(
 
 
 def _run(
-    of_the_other: Connection, pipe: Connection, work: Callable[..., None], arguments: tuple[Any]
+    of_the_other: Connection,
+    pipe: Connection,
+    work: Callable[..., None],
+    arguments: tuple[Any, ...],
 ) -> None:
     """Work, and end without a word where that fails: the other process sees that, and tells."""
     of_the_other.close()  # or its end would never be seen

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
+from copy import deepcopy
 from dataclasses import fields
 from itertools import islice
 from multiprocessing.connection import Connection
@@ -11,8 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bsmap_cli.beside import CAN_FORK, Beside
-from bsmap_cli.errors import LogError
+from bsmap_cli.beside import Beside
 from bsmap_cli.geometry.se2 import SE2
 from bsmap_cli.logs.reader import LogReader, ReadReport
 from bsmap_cli.sensor.scan import Ranges, Scan
@@ -34,48 +33,49 @@ def scans_ahead(reader: LogReader) -> Iterator[Scan]:
 
     Raises
     ------
-    LogError : as the reader does; and where the other process was ended from outside.
+    LogError : as the reader does.
     """
-    other = None
-    if CAN_FORK and not reader.is_stream:
-        with suppress(OSError):
-            other = Beside(_read, reader)
-    if other is None:
+    if reader.is_stream:
         return reader.scans()
-    return _received(other, reader.report)
+    try:
+        other = Beside(_read, reader)
+    except OSError:
+        return reader.scans()
+    return _received(other, reader)
 
 
-def _received(other: Beside, report: ReadReport) -> Iterator[Scan]:
+def _received(other: Beside, reader: LogReader) -> Iterator[Scan]:
+    """The scans that the other process reads; where it comes to grief, the rest is read here."""
+    at_first, count = deepcopy(reader.report), 0
     try:
         while True:
             try:
-                moving, fixed, ranges_m, read, failure = other.pipe.recv()
+                moving, fixed, ranges_m, report = other.pipe.recv()
             except (OSError, EOFError):
-                raise LogError("the process that reads the log was ended: try again") from None
-            for entry in fields(ReadReport):
-                setattr(report, entry.name, getattr(read, entry.name))
-            yield from _unpacked(moving, fixed, ranges_m)
-            if failure is not None:
-                raise failure
+                break
+            _copy(report, reader.report)
             if not moving:
                 return
+            count += len(moving)
+            yield from _unpacked(moving, fixed, ranges_m)
     finally:
         other.end()
+    _copy(at_first, reader.report)
+    yield from islice(reader.scans(), count, None)
+
+
+def _copy(report: ReadReport, target: ReadReport) -> None:
+    for entry in fields(ReadReport):
+        setattr(target, entry.name, getattr(report, entry.name))
 
 
 def _read(pipe: Connection, reader: LogReader) -> None:
     """Draw the scans and send them on; a message without any is the last."""
-    failure: Exception | None = None
     scans = reader.scans()
-    while True:
-        batch: list[Scan] = []
-        try:
-            batch.extend(islice(scans, BATCH))
-        except Exception as error:  # raised where the scans are wanted, behind those before it
-            failure = error
-        pipe.send((*_packed(batch), reader.report, failure))
-        if not batch or failure:
-            return
+    batch = None
+    while batch != []:
+        batch = list(islice(scans, BATCH))
+        pipe.send((*_packed(batch), reader.report))
 
 
 def _packed(scans: list[Scan]) -> tuple[list[_Moving], list[_Fixed], Ranges]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bsmap_cli.beside import CAN_FORK, halves
+from bsmap_cli.beside import halves
 from bsmap_cli.geometry.se2 import Points
 from bsmap_cli.mapping.cleanup import drop_unconfirmed, tidy
 from bsmap_cli.mapping.compact_clusters import unpacked_scans
@@ -110,7 +110,7 @@ def refine_poses(
                 pose[:] = result.pose
         return found
 
-    if cores > 1 and CAN_FORK and len(keyframes) >= WORTH_SHARING:
+    if cores > 1 and len(keyframes) >= WORTH_SHARING:
         return halves(refined, len(keyframes))
     return refined(0, len(keyframes))
 

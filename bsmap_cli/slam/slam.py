@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from bsmap_cli.beside import CAN_FORK
 from bsmap_cli.geometry.se2 import SE2, Points
 from bsmap_cli.mapping.freeze import freeze_level
 from bsmap_cli.mapping.map_document import MapDocument
@@ -78,7 +77,7 @@ class Slam:
         self._tasks: LoopTasks | None = None
         self._beside: LoopsBeside | None = None
         self._cores = cores
-        self._forks = cores > 1 and CAN_FORK
+        self._forks = cores > 1
         self._lost: list[dict[str, int]] = []
         self._degenerate = 0
         self._was_lost = False

@@ -60,9 +60,8 @@ def test_a_log_that_is_cut_off(tmp_path):
     assert_same(ahead, read(log, lambda reader: reader.scans()))
 
 
-def test_a_log_without_scans(tmp_path):
-    log = tmp_path / "none.mcap"
-    log.write_bytes((SAMPLES / "wall.mcap").read_bytes())
+def test_a_log_without_scans():
+    log = SAMPLES / "wall.mcap"
     said = []
     for draw in (scans_ahead, lambda reader: reader.scans()):
         with pytest.raises(LogError) as error:
@@ -71,14 +70,33 @@ def test_a_log_without_scans(tmp_path):
     assert said[0] == said[1]
 
 
-def test_where_the_other_process_is_killed(tmp_path):
-    with open_log([SAMPLES / "loop.csv.gz"], ReadOptions()) as reader:
+@pytest.mark.parametrize("options", [{}, {"every": 3}])
+@pytest.mark.parametrize("drawn", [1, BATCH, BATCH + 1])
+def test_where_the_other_process_is_killed_the_rest_is_read_here(drawn, options):
+    def draw(reader):
         scans = scans_ahead(reader)
-        next(scans)
+        yield from islice(scans, drawn)
         (process,) = active_children()
         os.kill(process.pid, signal.SIGKILL)
-        with pytest.raises(LogError, match="process that reads the log was ended"):
-            list(scans)
+        yield from scans
+
+    log = SAMPLES / "loop.csv.gz"
+    assert_same(read(log, draw, **options), read(log, lambda reader: reader.scans(), **options))
+
+
+def test_an_error_comes_behind_the_scans_before_it(monkeypatch):
+    with open_log([SAMPLES / "loop.csv.gz"], ReadOptions()) as reader:
+        whole, good = type(reader).scans, BATCH + 3
+
+        def torn(reader):
+            yield from islice(whole(reader), good)
+            raise LogError("the log is torn")
+
+        monkeypatch.setattr(type(reader), "scans", torn)
+        scans = scans_ahead(reader)
+        assert len(list(islice(scans, good))) == good
+        with pytest.raises(LogError, match="the log is torn"):
+            next(scans)
 
 
 def test_the_other_process_ends_when_nobody_wants_further_scans():

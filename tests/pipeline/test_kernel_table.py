@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from numba import typeof
 
+from bsmap_cli.geometry.compiled import ROOMS
 from bsmap_cli.mapping.continuity import GapRule
 from bsmap_cli.mapping.curve_map import CurveMap
 from bsmap_cli.mapping.least_surface import LeastSurface
@@ -79,3 +80,7 @@ def test_the_table_holds_what_is_called(rewrite_golden):
 def test_a_described_type_is_found_again(value):
     told = json.loads(json.dumps(described(typeof(value))))
     assert numba_type(told) == typeof(value)
+
+
+def test_what_is_kept_on_disk_goes_with_the_sources_of_every_room_that_has_kernels():
+    assert {name.split(".")[0] for name in kernel_table()} <= set(ROOMS)
